@@ -1,0 +1,1 @@
+//! Polylines: length, resampling, closest point.

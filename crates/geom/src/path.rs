@@ -1,0 +1,1 @@
+//! Straight paths over a mesh.

@@ -1,0 +1,1 @@
+//! Meshes made by formula: samples and test bodies.

@@ -1,0 +1,1 @@
+//! Hair without time: control hairs placed and combed, hairs instanced from maps, weights, interpolation.

@@ -1,0 +1,1 @@
+//! Hair under light: shading and the preview rasteriser.

@@ -1,0 +1,1 @@
+//! Shot and groom files.

@@ -1,0 +1,2 @@
+//! The `pelage` command.
+fn main() {}

@@ -1,0 +1,1 @@
+//! End-to-end, golden, determinism, cache and command-line tests.
