@@ -1,1 +1,19 @@
-//! Shot and groom files.
+//! Shot and groom files: plain structs, read with their places in the text so that every complaint shows its line.
+
+mod document;
+mod groom;
+mod shot;
+
+pub use document::{ConfigError, Document};
+pub use groom::{
+    Channel, ColorFeature, Comb, CombKind, Control, Feature, GroomFile, Layer, MapRef, Parting, Placement,
+};
+pub use groom::{Side, Space, WidthFeature, WrapMode};
+pub use shot::{CacheSettings, Export, ExportFormat, GroomRef, Preview, Shot, ShotFile, Skin, UpAxis};
+
+/// JSON Schema (draft 2020-12) of a shot file or a groom file, for editors.
+pub fn schema<T: schemars::JsonSchema>() -> String {
+    let mut text = serde_json::to_string_pretty(&schemars::schema_for!(T)).expect("a schema is plain JSON");
+    text.push('\n');
+    text
+}

@@ -1,0 +1,9 @@
+//! Finished steps by content: what a step reads (its recipe), where its result is kept, and why it ran again.
+
+mod hashes;
+mod recipe;
+mod store;
+
+pub use hashes::FileHashes;
+pub use recipe::{Field, Key, Recipe};
+pub use store::{Entry, Stats, Store};

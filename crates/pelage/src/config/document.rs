@@ -1,0 +1,227 @@
+//! A configuration file: its text, what it says, and where it says it.
+
+use miette::{Diagnostic, LabeledSpan, NamedSource, SourceSpan};
+use serde::de::DeserializeOwned;
+use std::path::{Path, PathBuf};
+use toml::de::{DeTable, DeValue};
+
+/// A complaint that points into a configuration file.
+#[derive(Debug)]
+pub struct ConfigError {
+    /// The file.
+    pub path: PathBuf,
+    /// What is wrong and what was expected.
+    pub what: String,
+    /// What the user can do; empty if there is nothing to add.
+    pub help: String,
+    source: NamedSource<String>,
+    span: Option<SourceSpan>,
+}
+
+impl std::fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.line() {
+            Some(line) => write!(f, "{}, line {line}: {}", self.path.display(), self.what),
+            None => write!(f, "{}: {}", self.path.display(), self.what),
+        }
+    }
+}
+
+impl std::error::Error for ConfigError {}
+
+impl Diagnostic for ConfigError {
+    fn help<'a>(&'a self) -> Option<Box<dyn std::fmt::Display + 'a>> {
+        (!self.help.is_empty()).then(|| Box::new(&self.help) as Box<dyn std::fmt::Display>)
+    }
+
+    fn source_code(&self) -> Option<&dyn miette::SourceCode> {
+        self.span.map(|_| &self.source as &dyn miette::SourceCode)
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        let span = self.span?;
+        Some(Box::new(std::iter::once(LabeledSpan::new_with_span(Some("here".to_owned()), span))))
+    }
+}
+
+impl ConfigError {
+    /// Line of the complaint, from 1.
+    pub fn line(&self) -> Option<usize> {
+        let at = self.span?.offset().min(self.source.inner().len());
+        Some(self.source.inner()[..at].matches('\n').count() + 1)
+    }
+}
+
+/// A parsed file with its text, kept to point into.
+#[derive(Clone, Debug)]
+pub struct Document<T> {
+    /// Where it was read.
+    pub path: PathBuf,
+    /// As it stands on disk.
+    pub text: String,
+    /// What it says.
+    pub value: T,
+}
+
+impl<T: DeserializeOwned> Document<T> {
+    /// Reads and parses a file. Unknown keys are refused, with the nearest known one as advice.
+    pub fn read(path: &Path) -> Result<Self, ConfigError> {
+        let bytes = std::fs::read(path).map_err(|e| {
+            let help = match e.kind() {
+                std::io::ErrorKind::NotFound => "`pelage init DIR` makes a shot folder that runs as it is",
+                _ => "",
+            };
+            plain(path, format!("can't be read: {e}"), help.to_owned())
+        })?;
+        let text = String::from_utf8(bytes).map_err(|e| {
+            let at = e.utf8_error().valid_up_to();
+            plain(path, format!("is not UTF-8 text (byte {at})"), "save it as UTF-8".to_owned())
+        })?;
+        Self::parse(path, text)
+    }
+
+    /// Parses the text of a file.
+    pub fn parse(path: &Path, text: String) -> Result<Self, ConfigError> {
+        match toml::from_str(&text) {
+            Ok(value) => Ok(Document { path: path.to_path_buf(), text, value }),
+            Err(e) => Err(ConfigError {
+                path: path.to_path_buf(),
+                what: first_line(e.message()),
+                help: suggestion(e.message()).unwrap_or_default(),
+                span: e.span().map(SourceSpan::from),
+                source: NamedSource::new(path.display().to_string(), text),
+            }),
+        }
+    }
+}
+
+impl<T> Document<T> {
+    /// A complaint about the value at a key such as `layer[0].length.value`; points at the longest part of the key that
+    /// the file has.
+    pub fn error(&self, key: &str, what: impl Into<String>, help: impl Into<String>) -> ConfigError {
+        ConfigError {
+            path: self.path.clone(),
+            what: format!("{key}: {}", what.into()),
+            help: help.into(),
+            span: span_of(&self.text, key),
+            source: NamedSource::new(self.path.display().to_string(), self.text.clone()),
+        }
+    }
+
+    /// A path written in this file, relative to the file's folder.
+    pub fn resolve(&self, written: &Path) -> PathBuf {
+        match self.path.parent() {
+            Some(folder) if written.is_relative() => tidy(&folder.join(written)),
+            _ => tidy(written),
+        }
+    }
+}
+
+/// Takes `x/..` and `.` out of a path without asking the disk.
+fn tidy(path: &Path) -> PathBuf {
+    use std::path::Component;
+    let mut out: Vec<Component<'_>> = Vec::new();
+    for part in path.components() {
+        match (part, out.last()) {
+            (Component::CurDir, _) => {}
+            (Component::ParentDir, Some(Component::Normal(_))) => {
+                out.pop();
+            }
+            _ => out.push(part),
+        }
+    }
+    out.iter().collect()
+}
+
+fn plain(path: &Path, what: String, help: String) -> ConfigError {
+    let source = NamedSource::new(path.display().to_string(), String::new());
+    ConfigError { path: path.to_path_buf(), what, help, source, span: None }
+}
+
+fn first_line(message: &str) -> String {
+    message.lines().collect::<Vec<_>>().join("; ")
+}
+
+/// "unknown field `lenght`, expected one of `name`, `length`" -> "did you mean `length`?"
+fn suggestion(message: &str) -> Option<String> {
+    if !message.starts_with("unknown field") && !message.starts_with("unknown variant") {
+        return None;
+    }
+    let mut quoted = message.split('`').skip(1).step_by(2);
+    let wrong = quoted.next()?;
+    let (distance, best) = quoted.map(|k| (strsim::damerau_levenshtein(wrong, k), k)).min()?;
+    (distance <= 1 + best.len().max(wrong.len()) / 3).then(|| format!("did you mean `{best}`?"))
+}
+
+/// Byte range of a key's value, or of the nearest enclosing value that exists.
+fn span_of(text: &str, key: &str) -> Option<SourceSpan> {
+    let root = DeTable::parse(text).ok()?;
+    let mut span = None;
+    let mut at: Option<&DeValue<'_>> = None;
+    for part in key.split('.') {
+        let (name, indices) = part.split_once('[').map_or((part, ""), |(n, i)| (n, i));
+        let next = match at {
+            None => root.get_ref().get(name),
+            Some(DeValue::Table(t)) => t.get(name),
+            Some(_) => None,
+        };
+        let Some(next) = next else { break };
+        span = Some(next.span());
+        at = Some(next.get_ref());
+        for index in indices.split('[').filter_map(|i| i.trim_end_matches(']').parse::<usize>().ok()) {
+            let Some(DeValue::Array(items)) = at else { break };
+            let Some(item) = items.get(index) else { break };
+            span = Some(item.span());
+            at = Some(item.get_ref());
+        }
+    }
+    // A whole table would underline many lines: its first line says enough.
+    span.map(|s| (s.start..text[s.clone()].find('\n').map_or(s.end, |n| s.start + n)).into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, serde::Deserialize)]
+    #[serde(deny_unknown_fields)]
+    #[expect(dead_code, reason = "only parsed")]
+    struct Inner {
+        length: f64,
+        #[serde(default)]
+        points: u32,
+    }
+
+    #[derive(Debug, serde::Deserialize)]
+    #[serde(deny_unknown_fields)]
+    #[expect(dead_code, reason = "only parsed")]
+    struct Outer {
+        layer: Vec<Inner>,
+    }
+
+    fn parse(text: &str) -> Result<Document<Outer>, ConfigError> {
+        Document::parse(Path::new("a/b.toml"), text.to_owned())
+    }
+
+    #[test]
+    fn unknown_keys_are_refused_with_the_line_and_the_nearest_name() {
+        let e = parse("[[layer]]\nlength = 2\nlenght = 3\n").unwrap_err();
+        assert_eq!(e.line(), Some(3));
+        assert_eq!(e.help, "did you mean `length`?");
+    }
+
+    #[test]
+    fn complaints_point_at_the_value() {
+        let doc = parse("[[layer]]\nlength = 2\n\n[[layer]]\nlength = -1\n").unwrap();
+        let e = doc.error("layer[1].length", "is negative", "");
+        assert_eq!(e.to_string(), "a/b.toml, line 5: layer[1].length: is negative");
+        assert_eq!(doc.error("layer[1].points", "is missing", "").line(), Some(4));
+    }
+
+    #[test]
+    fn paths_are_relative_to_the_file() {
+        let doc = parse("layer = []").unwrap();
+        assert_eq!(doc.resolve(Path::new("../maps/x.png")), Path::new("maps/x.png"));
+        assert_eq!(doc.resolve(Path::new("/x.png")), Path::new("/x.png"));
+    }
+}

@@ -1,0 +1,451 @@
+//! The groom file: control hairs, how they are combed, and the layers of hair grown from maps.
+
+use super::document::{ConfigError, Document};
+use schemars::JsonSchema;
+use serde::Deserialize;
+use std::path::PathBuf;
+
+/// A look: control hairs and the layers of hair that follow them.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GroomFile {
+    /// Control hairs: where they stand and what they are before combing.
+    pub control: Control,
+    /// Lines on the skin across which no hair mixes control hairs.
+    #[serde(default)]
+    pub parting: Vec<Parting>,
+    /// Combing, in this order.
+    #[serde(default)]
+    pub comb: Vec<Comb>,
+    /// Layers of hair: undercoat, overcoat, any number.
+    pub layer: Vec<Layer>,
+}
+
+/// Control hairs: where they stand and what they are before combing.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Control {
+    /// Where they stand, besides one at every vertex of every chart's border.
+    pub placement: Placement,
+    /// Points of a control hair, the root included. Default: 4.
+    #[serde(default = "four")]
+    pub points: usize,
+    /// Length before combing, scene units. Default: the longest layer's length, with its map.
+    pub length: Option<Feature>,
+    /// Push hairs that enter the skin back out after combing. Default: true.
+    #[serde(default = "yes")]
+    pub push_up: bool,
+    /// Distance from the skin that pushed hairs keep, millimetres. Default: 0.5.
+    #[serde(default = "half")]
+    pub clearance: f64,
+}
+
+fn four() -> usize {
+    4
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn half() -> f64 {
+    0.5
+}
+
+/// Where control hairs stand: exactly one of the three.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Placement {
+    /// Control hairs per square centimetre of skin.
+    pub per_cm2: Option<f64>,
+    /// Counts along u and along v, on every chart.
+    pub grid: Option<[usize; 2]>,
+    /// Curves drawn elsewhere (USD, PLY or .hair), bound to the skin.
+    pub curves: Option<PathBuf>,
+}
+
+/// A line on the skin across which no hair mixes control hairs.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Parting {
+    /// Name, for comb operations that act on one side.
+    pub name: String,
+    /// Points on or near the rest skin, scene units, in order.
+    pub points: Vec<[f64; 3]>,
+}
+
+/// One combing operation. Which keys it reads depends on its kind.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Comb {
+    /// What it does.
+    pub kind: CombKind,
+    /// Strength, 0 to 1. Default: 1.
+    #[serde(default = "one")]
+    pub weight: f64,
+    /// Painted strength: a map that multiplies the weight.
+    pub region: Option<MapRef>,
+    /// direction-curve: the curve at the rest pose, scene units, in the direction of combing.
+    pub points: Option<Vec<[f64; 3]>>,
+    /// direction-curve: region of influence around the curve, scene units. Default: everywhere.
+    pub radius: Option<f64>,
+    /// direction-curve: share of the radius over which the influence fades, 0 (hard) to 1. Default: 1.
+    pub falloff: Option<f64>,
+    /// direction-curve, direction-map: how far hairs turn toward the direction, 0 to 1. Default: 1.
+    pub bend: Option<f64>,
+    /// 0: the whole hair turns at its root; 1: the turn grows from root to tip. Default: 0.
+    #[serde(default)]
+    pub curvature: f64,
+    /// direction-curve: acts only on one side of a parting.
+    pub parting: Option<String>,
+    /// direction-curve: the side of that parting, seen along its points from outside.
+    pub side: Option<Side>,
+    /// direction-map: RGB map of directions (0..1 stands for -1..1); bend, lay-down, length: a map that multiplies.
+    pub map: Option<MapRef>,
+    /// direction-map: what the map's directions refer to. Default: "root".
+    pub space: Option<Space>,
+    /// bend: angle at the tip, degrees.
+    pub angle: Option<f64>,
+    /// lay-down: 0 leaves hairs as they are, 1 lays them on the skin.
+    pub amount: Option<f64>,
+    /// length: factor on the control hair's length.
+    pub value: Option<f64>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// What a combing operation does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum CombKind {
+    /// Turns hairs along a curve in space.
+    DirectionCurve,
+    /// Turns hairs along painted directions.
+    DirectionMap,
+    /// Bends hairs in the plane of the normal and their lean.
+    Bend,
+    /// Lays hairs down toward the skin.
+    LayDown,
+    /// Scales control hairs.
+    Length,
+}
+
+/// A side of a parting.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Side {
+    /// Left, seen from outside along the parting's points.
+    Left,
+    /// Right.
+    Right,
+}
+
+/// What painted directions refer to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Space {
+    /// The root frame: red along the normal, green along u, blue along normal x u.
+    #[default]
+    Root,
+    /// The scene's axes at the rest pose.
+    World,
+}
+
+/// A map without a value of its own.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MapRef {
+    /// Image file; `<UDIM>` stands for the tile number.
+    pub map: PathBuf,
+    /// Channel to read. Default: the grey value.
+    #[serde(default)]
+    pub channel: Channel,
+    /// What the map says outside its square. Default: "clamp".
+    #[serde(default)]
+    pub wrap: WrapMode,
+}
+
+/// Channel of an image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Channel {
+    /// The grey value (luminance of a colour image).
+    #[default]
+    Grey,
+    /// Red.
+    R,
+    /// Green.
+    G,
+    /// Blue.
+    B,
+    /// Alpha.
+    A,
+}
+
+/// What a map says outside its square.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum WrapMode {
+    /// The border texel goes on.
+    #[default]
+    Clamp,
+    /// The map repeats.
+    Repeat,
+}
+
+/// A value, a map that multiplies it, and noise.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Feature {
+    /// Value where the map is 1.
+    pub value: f64,
+    /// Image that multiplies the value; `<UDIM>` stands for the tile number.
+    pub map: Option<PathBuf>,
+    /// Channel of the map. Default: the grey value.
+    #[serde(default)]
+    pub channel: Channel,
+    /// What the map says outside its square. Default: "clamp".
+    #[serde(default)]
+    pub wrap: WrapMode,
+    /// Random variation per hair: 0.1 spreads evenly over +-10 %. Default: 0.
+    #[serde(default)]
+    pub noise: f64,
+}
+
+/// Render width.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WidthFeature {
+    /// Diameter at the root, micrometres, where the map is 1.
+    pub value: f64,
+    /// Diameter at the tip as a share of the root's. Default: 0.3.
+    #[serde(default = "tip")]
+    pub tip: f64,
+    /// Image that multiplies the value; `<UDIM>` stands for the tile number.
+    pub map: Option<PathBuf>,
+    /// Channel of the map. Default: the grey value.
+    #[serde(default)]
+    pub channel: Channel,
+    /// What the map says outside its square. Default: "clamp".
+    #[serde(default)]
+    pub wrap: WrapMode,
+    /// Random variation per hair. Default: 0.
+    #[serde(default)]
+    pub noise: f64,
+}
+
+fn tip() -> f64 {
+    0.3
+}
+
+impl WidthFeature {
+    /// The part that every feature has.
+    pub fn feature(&self) -> Feature {
+        let WidthFeature { value, map, channel, wrap, noise, .. } = self.clone();
+        Feature { value, map, channel, wrap, noise }
+    }
+}
+
+/// Hair colour.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ColorFeature {
+    /// Linear red, green, blue, 0 to 1. Multiplies the map.
+    pub value: [f64; 3],
+    /// Colour image (sRGB if 8 or 16 bit); `<UDIM>` stands for the tile number.
+    pub map: Option<PathBuf>,
+    /// What the map says outside its square. Default: "clamp".
+    #[serde(default)]
+    pub wrap: WrapMode,
+    /// Random variation of brightness per hair. Default: 0.
+    #[serde(default)]
+    pub noise: f64,
+}
+
+/// A layer of hair.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Layer {
+    /// Name, unique; names the layer's ids and its primitive in exported files.
+    pub name: String,
+    /// Hairs per square centimetre.
+    pub density: Feature,
+    /// Map that turns areas off: multiplies the density.
+    pub on_off: Option<MapRef>,
+    /// Length, scene units.
+    pub length: Feature,
+    /// Render width. Default: 80 micrometres.
+    #[serde(default = "default_width")]
+    pub width: WidthFeature,
+    /// Opacity, 0 to 1. Default: 1.
+    #[serde(default = "default_opacity")]
+    pub opacity: Feature,
+    /// Colour. Default: brown.
+    #[serde(default = "default_color")]
+    pub color: ColorFeature,
+    /// Points of a hair, the root included. Default: as many as the control hairs have.
+    pub points: Option<usize>,
+}
+
+fn default_width() -> WidthFeature {
+    let Feature { value, map, channel, wrap, noise } = constant(80.0);
+    WidthFeature { value, tip: tip(), map, channel, wrap, noise }
+}
+
+fn default_opacity() -> Feature {
+    constant(1.0)
+}
+
+fn default_color() -> ColorFeature {
+    ColorFeature { value: [0.15, 0.08, 0.04], map: None, wrap: WrapMode::Clamp, noise: 0.1 }
+}
+
+fn constant(value: f64) -> Feature {
+    Feature { value, map: None, channel: Channel::Grey, wrap: WrapMode::Clamp, noise: 0.0 }
+}
+
+impl Document<GroomFile> {
+    /// Checks values that types can't.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        self.check_control()?;
+        for (i, p) in self.value.parting.iter().enumerate() {
+            let key = format!("parting[{i}]");
+            if p.points.len() < 2 || !p.points.iter().flatten().all(|x| x.is_finite()) {
+                return Err(self.error(&format!("{key}.points"), "must be two or more finite points", ""));
+            }
+            if self.value.parting[..i].iter().any(|q| q.name == p.name) {
+                return Err(self.error(&format!("{key}.name"), "is used twice", "name every parting differently"));
+            }
+        }
+        for (i, c) in self.value.comb.iter().enumerate() {
+            self.check_comb(&format!("comb[{i}]"), c)?;
+        }
+        if self.value.layer.is_empty() {
+            return Err(self.error("layer", "the groom has no layer", "add a [[layer]]"));
+        }
+        for (i, l) in self.value.layer.iter().enumerate() {
+            let key = format!("layer[{i}]");
+            if l.name.is_empty() || self.value.layer[..i].iter().any(|m| m.name == l.name) {
+                return Err(self.error(
+                    &format!("{key}.name"),
+                    "is empty or used twice",
+                    "name every layer differently",
+                ));
+            }
+            self.check_layer(&key, l)?;
+        }
+        Ok(())
+    }
+
+    fn check_control(&self) -> Result<(), ConfigError> {
+        let c = &self.value.control;
+        let p = &c.placement;
+        let given = [p.per_cm2.is_some(), p.grid.is_some(), p.curves.is_some()];
+        if given.iter().filter(|g| **g).count() != 1 {
+            let help = "give exactly one of per_cm2, grid, curves";
+            return Err(self.error("control.placement", "does not say where control hairs stand", help));
+        }
+        if let Some(d) = p.per_cm2 {
+            self.within("control.placement.per_cm2", d, 0.0, 1e4)?;
+        }
+        if let Some(g) = p.grid.filter(|g| g.iter().any(|n| !(1..=4096).contains(n))) {
+            let what = format!("{} x {} is out of range", g[0], g[1]);
+            return Err(self.error("control.placement.grid", what, "counts go from 1 to 4096"));
+        }
+        self.points("control.points", Some(c.points))?;
+        if let Some(f) = &c.length {
+            self.feature("control.length", f, 1e6)?;
+        }
+        self.within("control.clearance", c.clearance, 0.0, 1e3)
+    }
+
+    fn check_layer(&self, key: &str, l: &Layer) -> Result<(), ConfigError> {
+        self.feature(&format!("{key}.density"), &l.density, 1e5)?;
+        self.feature(&format!("{key}.length"), &l.length, 1e6)?;
+        self.feature(&format!("{key}.width"), &l.width.feature(), 1e6)?;
+        self.within(&format!("{key}.width.tip"), l.width.tip, 0.0, 10.0)?;
+        self.feature(&format!("{key}.opacity"), &l.opacity, 1.0)?;
+        for (i, x) in l.color.value.iter().enumerate() {
+            self.within(&format!("{key}.color.value[{i}]"), *x, 0.0, 1e3)?;
+        }
+        self.within(&format!("{key}.color.noise"), l.color.noise, 0.0, 1.0)?;
+        self.points(&format!("{key}.points"), l.points)
+    }
+
+    /// Keys that belong to another kind are refused: nobody should tune a value that nothing reads.
+    fn check_comb(&self, key: &str, c: &Comb) -> Result<(), ConfigError> {
+        use CombKind::{Bend, DirectionCurve, DirectionMap, LayDown, Length};
+        let given: [(&str, bool, &[CombKind]); 11] = [
+            ("points", c.points.is_some(), &[DirectionCurve]),
+            ("radius", c.radius.is_some(), &[DirectionCurve]),
+            ("falloff", c.falloff.is_some(), &[DirectionCurve]),
+            ("bend", c.bend.is_some(), &[DirectionCurve, DirectionMap]),
+            ("parting", c.parting.is_some(), &[DirectionCurve]),
+            ("side", c.side.is_some(), &[DirectionCurve]),
+            ("map", c.map.is_some(), &[DirectionMap, Bend, LayDown, Length]),
+            ("space", c.space.is_some(), &[DirectionMap]),
+            ("angle", c.angle.is_some(), &[Bend]),
+            ("amount", c.amount.is_some(), &[LayDown]),
+            ("value", c.value.is_some(), &[Length]),
+        ];
+        let needed = match c.kind {
+            DirectionCurve => "points",
+            DirectionMap => "map",
+            Bend => "angle",
+            LayDown => "amount",
+            Length => "value",
+        };
+        for (name, has, kinds) in given {
+            if has && !kinds.contains(&c.kind) {
+                return Err(self.error(
+                    &format!("{key}.{name}"),
+                    "is not read by this kind of operation",
+                    "take it out",
+                ));
+            }
+            if name == needed && !has {
+                return Err(self.error(key, format!("this kind of operation needs `{name}`"), ""));
+            }
+        }
+        if c.points.as_ref().is_some_and(|p| p.len() < 2 || !p.iter().flatten().all(|x| x.is_finite())) {
+            return Err(self.error(&format!("{key}.points"), "must be two or more finite points", ""));
+        }
+        if c.parting.is_some() != c.side.is_some() {
+            return Err(self.error(key, "`parting` and `side` go together", "give both or none"));
+        }
+        if let Some(name) = c.parting.as_ref().filter(|n| !self.value.parting.iter().any(|p| p.name == **n)) {
+            let help = "name one of the [[parting]] of this file";
+            return Err(self.error(&format!("{key}.parting"), format!("there is no parting `{name}`"), help));
+        }
+        let unit = [("weight", Some(c.weight)), ("falloff", c.falloff), ("bend", c.bend), ("amount", c.amount)];
+        for (name, value) in unit.into_iter().chain([("curvature", Some(c.curvature))]) {
+            self.within(&format!("{key}.{name}"), value.unwrap_or(0.0), 0.0, 1.0)?;
+        }
+        self.within(&format!("{key}.radius"), c.radius.unwrap_or(1.0), 0.0, f64::MAX)?;
+        self.within(&format!("{key}.angle"), c.angle.unwrap_or(0.0), -720.0, 720.0)?;
+        self.within(&format!("{key}.value"), c.value.unwrap_or(1.0), 0.0, 1e6)
+    }
+
+    fn feature(&self, key: &str, f: &Feature, max: f64) -> Result<(), ConfigError> {
+        self.within(&format!("{key}.value"), f.value, 0.0, max)?;
+        self.within(&format!("{key}.noise"), f.noise, 0.0, 1.0)
+    }
+
+    fn points(&self, key: &str, points: Option<usize>) -> Result<(), ConfigError> {
+        match points {
+            Some(n) if !(2..=4096).contains(&n) => {
+                Err(self.error(key, "must be between 2 and 4096", "8 to 16 is usual"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn within(&self, key: &str, x: f64, low: f64, high: f64) -> Result<(), ConfigError> {
+        if (low..=high).contains(&x) {
+            return Ok(());
+        }
+        Err(self.error(key, format!("{x} is out of range"), format!("values go from {low} to {high}")))
+    }
+}

@@ -1,0 +1,198 @@
+//! The shot file, `pipeline.toml`.
+
+use super::document::{ConfigError, Document};
+use schemars::JsonSchema;
+use serde::Deserialize;
+use std::path::PathBuf;
+
+/// A shot: a skin in motion, the groom it wears, and what to write.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ShotFile {
+    /// What the shot is.
+    pub shot: Shot,
+    /// The surface that hair grows on.
+    pub skin: Skin,
+    /// The look.
+    pub groom: GroomRef,
+    /// Files to write.
+    #[serde(default)]
+    pub export: Export,
+    /// Pictures to write.
+    #[serde(default)]
+    pub preview: Preview,
+    /// Where finished steps are kept.
+    #[serde(default)]
+    pub cache: CacheSettings,
+}
+
+/// What the shot is.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Shot {
+    /// Name; outputs go to a folder of that name.
+    pub name: String,
+    /// First and last frame, both included.
+    pub frames: [i32; 2],
+    /// Frames per second.
+    pub fps: f64,
+    /// Metres per scene unit: 1 for metres, 0.01 for centimetres.
+    pub meters_per_unit: f64,
+    /// The axis that points up.
+    #[serde(default)]
+    pub up: UpAxis,
+}
+
+/// The axis that points up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum UpAxis {
+    /// +y.
+    #[default]
+    Y,
+    /// +z.
+    Z,
+}
+
+/// The surface that hair grows on: a rest pose, and either no motion, a rigid motion, or one file per frame.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Skin {
+    /// PLY of the rest pose, with texture coordinates.
+    pub rest: PathBuf,
+    /// CSV of a rigid motion: time_s, tx, ty, tz (metres), qx, qy, qz, qw, from the rest pose.
+    pub motion: Option<PathBuf>,
+    /// The frame at which the motion's time is 0. Default: the shot's first frame.
+    pub motion_start: Option<f64>,
+    /// Point in scene units that the motion's rotation leaves in place. Default: the origin.
+    #[serde(default)]
+    pub pivot: [f64; 3],
+    /// PLY per frame with the rest pose's vertices, `#` standing for the frame number: "anim/bust.####.ply".
+    pub frames: Option<PathBuf>,
+}
+
+/// The look.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GroomRef {
+    /// The groom file.
+    pub file: PathBuf,
+}
+
+/// Files to write.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Export {
+    /// Formats. Default: `["usd"]`.
+    pub formats: Vec<ExportFormat>,
+    /// Folder that holds the folder of the shot. Default: "out".
+    pub dir: PathBuf,
+}
+
+impl Default for Export {
+    fn default() -> Self {
+        Export { formats: vec![ExportFormat::Usd], dir: "out".into() }
+    }
+}
+
+/// A file format for finished hair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum ExportFormat {
+    /// OpenUSD, `hair.usdc`: one file, all frames.
+    Usd,
+    /// MCAP with protobuf messages, `hair.mcap`: one file, all frames.
+    Mcap,
+    /// PLY, `hair.####.ply`: one file per frame.
+    Ply,
+}
+
+/// Pictures to write.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Preview {
+    /// Frame of the still. Default: the middle of the shot.
+    pub frame: Option<i32>,
+    /// Width and height in pixels. Default: `[1280, 960]`.
+    pub size: [u32; 2],
+    /// Direction from the subject to the camera. Default: from the front, a little to the side and above.
+    pub from: [f64; 3],
+    /// Pictures in the contact sheet of `pelage preview`. Default: 8.
+    pub sheet: u32,
+    /// Zoom on the subject: 1 frames all of the skin and hair, 2 shows half of that. Default: 1.
+    pub zoom: f64,
+}
+
+impl Default for Preview {
+    fn default() -> Self {
+        Preview { frame: None, size: [1280, 960], from: [0.5, 0.15, 1.0], sheet: 8, zoom: 1.0 }
+    }
+}
+
+/// Where finished steps are kept.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct CacheSettings {
+    /// Folder. Default: ".pelage-cache".
+    pub dir: PathBuf,
+}
+
+impl Default for CacheSettings {
+    fn default() -> Self {
+        CacheSettings { dir: ".pelage-cache".into() }
+    }
+}
+
+impl Document<ShotFile> {
+    /// Checks values that types can't.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        let s = &self.value;
+        let bad = |key: &str, what: &str, help: &str| Err(self.error(key, what, help));
+        let positive = |x: f64| x.is_finite() && x > 0.0;
+        let name_ok = |c: char| c.is_alphanumeric() || "-_. ".contains(c);
+        if s.shot.name.is_empty() || !s.shot.name.chars().all(name_ok) || s.shot.name.starts_with('.') {
+            return bad("shot.name", "is not a folder name", "use letters, digits, '-', '_' and '.'");
+        }
+        if s.shot.frames[0] > s.shot.frames[1] {
+            return bad("shot.frames", "the last frame comes before the first", "write [first, last]");
+        }
+        if i64::from(s.shot.frames[1]) - i64::from(s.shot.frames[0]) >= 1_000_000 {
+            return bad("shot.frames", "is more than a million frames", "write [first, last]");
+        }
+        if !positive(s.shot.fps) {
+            return bad("shot.fps", "must be above 0", "24 is film");
+        }
+        if !positive(s.shot.meters_per_unit) {
+            return bad("shot.meters_per_unit", "must be above 0", "1 for metres, 0.01 for centimetres");
+        }
+        if s.skin.motion.is_some() && s.skin.frames.is_some() {
+            return bad("skin.motion", "can't go together with skin.frames", "keep one of the two");
+        }
+        if s.skin.frames.as_ref().is_some_and(|f| f.to_string_lossy().matches('#').count() == 0) {
+            return bad("skin.frames", "has no # for the frame number", "write for example \"anim/bust.####.ply\"");
+        }
+        if !s.skin.pivot.iter().all(|x| x.is_finite()) {
+            return bad("skin.pivot", "must be three finite numbers", "");
+        }
+        if s.export.formats.iter().enumerate().any(|(i, f)| s.export.formats[..i].contains(f)) {
+            return bad("export.formats", "names a format twice", "");
+        }
+        if let Some(f) = s.preview.frame.filter(|f| !(s.shot.frames[0]..=s.shot.frames[1]).contains(f)) {
+            let help = format!("the shot goes from {} to {}", s.shot.frames[0], s.shot.frames[1]);
+            return Err(self.error("preview.frame", format!("{f} is not a frame of the shot"), help));
+        }
+        if s.preview.size.iter().any(|&x| !(16..=8192).contains(&x)) {
+            return bad("preview.size", "must be between 16 and 8192 pixels", "");
+        }
+        if !s.preview.from.iter().all(|x| x.is_finite()) || s.preview.from.iter().all(|&x| x == 0.0) {
+            return bad("preview.from", "must be a direction", "for example [0.0, 0.0, 1.0]");
+        }
+        if !positive(s.preview.zoom) {
+            return bad("preview.zoom", "must be above 0", "1 shows everything");
+        }
+        if !(1..=100).contains(&s.preview.sheet) {
+            return bad("preview.sheet", "must be between 1 and 100 pictures", "");
+        }
+        Ok(())
+    }
+}
