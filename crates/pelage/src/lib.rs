@@ -1,9 +1,15 @@
 //! Everything that touches a disk or a person: formats, shot and groom files, cache, stages, command line.
 
 pub mod cache;
+pub mod cli;
 pub mod config;
 pub mod error;
 pub mod files;
 pub mod format;
+pub mod progress;
+pub mod project;
+pub mod report;
+pub mod sample;
+pub mod stage;
 
 pub use error::Error;

@@ -1,2 +1,16 @@
 //! The `pelage` command.
-fn main() {}
+
+use clap::Parser;
+use pelage::cli::{Arguments, execute};
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    match execute(Arguments::parse()) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(e) => {
+            eprintln!("{}", e.report());
+            ExitCode::from(e.exit_code())
+        }
+    }
+}

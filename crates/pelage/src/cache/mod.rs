@@ -4,6 +4,6 @@ mod hashes;
 mod recipe;
 mod store;
 
-pub use hashes::FileHashes;
+pub use hashes::{FileHashes, hash_file};
 pub use recipe::{Field, Key, Recipe};
 pub use store::{Entry, Stats, Store};

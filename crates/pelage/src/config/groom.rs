@@ -30,7 +30,7 @@ pub struct Control {
     /// Points of a control hair, the root included. Default: 4.
     #[serde(default = "four")]
     pub points: usize,
-    /// Length before combing, scene units. Default: the longest layer's length, with its map.
+    /// Length before combing, scene units. Default: the longest value among the layers, without its map.
     pub length: Option<Feature>,
     /// Push hairs that enter the skin back out after combing. Default: true.
     #[serde(default = "yes")]

@@ -1,0 +1,215 @@
+//! The command line: arguments, and one function a command. Results go to stdout, talk to stderr.
+
+mod cache;
+mod compare;
+mod init;
+mod inspect;
+mod run;
+
+use crate::Error;
+use crate::stage::Stage;
+use clap::{Parser, Subcommand};
+use std::path::PathBuf;
+
+/// Grows, combs and exports every hair of a character, shot by shot.
+#[derive(Debug, Parser)]
+#[command(name = "pelage", version, arg_required_else_help = true)]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Make a new shot folder that runs as it is
+    Init {
+        /// Folder to make; must be empty or absent
+        dir: PathBuf,
+        /// Skin to copy into it (PLY with texture coordinates); the sample bust if none is given
+        #[arg(long)]
+        skin: Option<PathBuf>,
+        /// Metres per unit of that skin
+        #[arg(long, default_value_t = 0.01)]
+        meters_per_unit: f64,
+        /// Sample to make when no skin is given
+        #[arg(long, value_enum, default_value_t = Sample::Bust)]
+        sample: Sample,
+    },
+    /// Bring every output up to date
+    Run(RunArguments),
+    /// Say what would run, and why; run nothing
+    Plan(RunArguments),
+    /// Make the pictures: a still and a contact sheet
+    Preview(RunArguments),
+    /// Say what is in a file: counts, bounds, units, ids, warnings
+    Inspect {
+        /// A skin, curves, map, cache entry or motion
+        file: PathBuf,
+        /// JSON instead of text
+        #[arg(long)]
+        json: bool,
+    },
+    /// Say how far two results differ; exit code 1 if they do
+    Compare {
+        /// Curves
+        a: PathBuf,
+        /// Curves
+        b: PathBuf,
+        /// Largest distance that still counts as equal, scene units
+        #[arg(long, default_value_t = 0.0)]
+        tolerance: f64,
+        /// JSON instead of text
+        #[arg(long)]
+        json: bool,
+    },
+    /// Look after the cache
+    Cache {
+        /// What to do with it
+        #[command(subcommand)]
+        action: CacheAction,
+    },
+    /// Print the JSON Schema of a configuration file, for editors
+    Schema {
+        /// Which file
+        #[arg(value_enum)]
+        file: SchemaFile,
+    },
+}
+
+/// Arguments of commands that work on a shot.
+#[derive(Debug, clap::Args)]
+pub struct RunArguments {
+    /// Shot file
+    #[arg(default_value = "pipeline.toml")]
+    pub shot: PathBuf,
+    /// Last stage to bring up to date
+    #[arg(long, value_enum)]
+    pub to: Option<Stage>,
+    /// Frames: 1001-1010,1020
+    #[arg(long, value_parser = parse_frames, allow_hyphen_values = true)]
+    pub frames: Option<Frames>,
+    /// Threads; all cores if not given
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub jobs: Option<u16>,
+    /// Stage that runs again whether its results are there or not
+    #[arg(long, value_enum)]
+    pub force: Option<Stage>,
+    /// Report as JSON on stdout
+    #[arg(long)]
+    pub json: bool,
+    /// No progress
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+/// A parsed list of frames.
+#[derive(Clone, Debug)]
+pub struct Frames(pub std::collections::BTreeSet<i32>);
+
+/// What to do with the cache.
+#[derive(Debug, Subcommand)]
+pub enum CacheAction {
+    /// Entries and bytes by stage
+    Stats(CacheArguments),
+    /// Remove entries that the last run of no shot used
+    Prune(CacheArguments),
+    /// Read every byte of every entry and check it
+    Verify(CacheArguments),
+}
+
+/// Arguments of cache commands.
+#[derive(Debug, clap::Args)]
+pub struct CacheArguments {
+    /// Shot file that names the cache
+    #[arg(default_value = "pipeline.toml")]
+    pub shot: PathBuf,
+    /// JSON instead of text
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Samples that `init` makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Sample {
+    /// A human bust with long hair.
+    Bust,
+    /// A short-furred animal with undercoat and overcoat.
+    Animal,
+}
+
+/// Configuration files that have a schema.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum SchemaFile {
+    /// `pipeline.toml`.
+    Shot,
+    /// `grooms/*.toml`.
+    Groom,
+}
+
+/// "1001-1010,1020" -> the frames. Negative numbers are frames too: "-5--2".
+fn parse_frames(text: &str) -> Result<Frames, String> {
+    let bad = || format!("`{text}` is not a list of frames: write for example 1001-1010,1020");
+    let mut frames = std::collections::BTreeSet::new();
+    for part in text.split(',') {
+        let cut = part.char_indices().skip(1).find(|(_, c)| *c == '-').map(|(i, _)| i);
+        let (first, last) = cut.map_or((part, part), |i| (&part[..i], &part[i + 1..]));
+        let first: i32 = first.trim().parse().map_err(|_| bad())?;
+        let last: i32 = last.trim().parse().map_err(|_| bad())?;
+        if first > last || i64::from(last) - i64::from(first) > 1_000_000 {
+            return Err(bad());
+        }
+        frames.extend(first..=last);
+    }
+    Ok(Frames(frames))
+}
+
+/// Does what the arguments say; true if the exit code is 0.
+pub fn execute(arguments: Arguments) -> Result<bool, Error> {
+    match arguments.command {
+        Command::Init { dir, skin, meters_per_unit, sample } => init::init(&dir, skin.as_deref(), meters_per_unit, sample),
+        Command::Run(a) => run::run(a, false),
+        Command::Preview(a) => run::run(a, true),
+        Command::Plan(a) => run::plan(a),
+        Command::Inspect { file, json } => inspect::inspect(&file, json),
+        Command::Compare { a, b, tolerance, json } => compare::compare(&a, &b, tolerance, json),
+        Command::Cache { action } => cache::cache(action),
+        Command::Schema { file } => {
+            let text = match file {
+                SchemaFile::Shot => crate::config::schema::<crate::config::ShotFile>(),
+                SchemaFile::Groom => crate::config::schema::<crate::config::GroomFile>(),
+            };
+            print(&text);
+            Ok(true)
+        }
+    }
+}
+
+/// Writes to stdout; a reader that closed the pipe is no error.
+fn print(text: &str) {
+    use std::io::Write;
+    let mut out = std::io::stdout().lock();
+    let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_lists_of_ranges() {
+        let frames = |t| parse_frames(t).map(|f| f.0.into_iter().collect::<Vec<_>>());
+        assert_eq!(frames("1001-1003,1007").unwrap(), [1001, 1002, 1003, 1007]);
+        assert_eq!(frames("-5--3,-1").unwrap(), [-5, -4, -3, -1]);
+        for bad in ["", "a", "3-1", "1,,2", "1-", "1-99999999"] {
+            assert!(frames(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn arguments_are_consistent() {
+        use clap::CommandFactory;
+        Arguments::command().debug_assert();
+    }
+}

@@ -1,0 +1,87 @@
+//! `pelage run`, `pelage plan`, `pelage preview`.
+
+use super::{RunArguments, print};
+use crate::Error;
+use crate::files::write_whole;
+use crate::progress::Progress;
+use crate::project::Project;
+use crate::report::Report;
+use crate::stage::{Options, PlannedStage, Runner, Stage};
+use std::io::Write;
+
+fn options(a: &RunArguments, sheet: bool) -> Options {
+    Options { to: a.to, frames: a.frames.as_ref().map(|f| f.0.clone()), force: a.force, without: sheet.then_some(Stage::Export), sheet }
+}
+
+/// Sets the number of threads. Results do not depend on it.
+fn threads(jobs: Option<u16>) -> Result<(), Error> {
+    let Some(jobs) = jobs else { return Ok(()) };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(jobs)).build_global();
+    pool.map_err(|e| Error::input(format!("--jobs {jobs}: {e}"), "give fewer"))
+}
+
+/// Brings a shot up to date; with `sheet`, only what its pictures need.
+pub fn run(a: RunArguments, sheet: bool) -> Result<bool, Error> {
+    threads(a.jobs)?;
+    let project = Project::open(&a.shot)?;
+    let mut options = options(&a, sheet);
+    if sheet && options.frames.is_none() {
+        let frames = project.sheet_frames().into_iter().chain([project.still_frame()]);
+        options.frames = Some(frames.collect());
+    }
+    let mut progress = Progress::new(a.quiet);
+    let mut runner = Runner::new(&project, options, &mut progress)?;
+    let report = runner.run()?;
+    drop(runner);
+    let out = project.out_dir();
+    if report.ran() > 0 && out.is_dir() {
+        let path = out.join("report.json");
+        write_whole(&path, |f| f.write_all(report.json().as_bytes())).map_err(Error::disk(&path))?;
+    }
+    print(&if a.json { report.json() } else { summary(&report, &project) });
+    Ok(true)
+}
+
+fn summary(report: &Report, project: &Project) -> String {
+    if report.ran() == 0 {
+        let reused: usize = report.stages.iter().map(|s| s.reused).sum();
+        return format!("nothing to do: all {reused} steps are up to date\n");
+    }
+    let mut out = String::new();
+    for s in &report.stages {
+        let counts: Vec<String> = s.counts.iter().filter(|(_, n)| **n > 0).map(|(k, n)| format!("{n} {k}")).collect();
+        let line = format!("{:<12} {:>4} ran {:>4} reused  {}", s.name, s.ran, s.reused, counts.join(", "));
+        out.push_str(line.trim_end());
+        out.push('\n');
+    }
+    out.push_str(&format!("results in {}\n", project.label(&project.out_dir())));
+    out
+}
+
+/// Says what would run, and why.
+pub fn plan(a: RunArguments) -> Result<bool, Error> {
+    let project = Project::open(&a.shot)?;
+    let mut progress = Progress::new(true);
+    let planned = Runner::new(&project, options(&a, false), &mut progress)?.planned();
+    if a.json {
+        print(&(serde_json::to_string_pretty(&planned).expect("plain JSON") + "\n"));
+    } else if planned.iter().all(|s| s.run.is_empty()) {
+        print("nothing to do\n");
+    } else {
+        print(&planned.iter().map(describe).collect::<String>());
+    }
+    Ok(true)
+}
+
+fn describe(stage: &PlannedStage) -> String {
+    let mut out = format!("{:<12} {:>4} to run {:>4} reused\n", stage.name, stage.run.len(), stage.reused);
+    for reason in &stage.reasons {
+        out.push_str(&format!("{:<12}   because {reason}\n", ""));
+    }
+    let shown = stage.run.iter().take(8).map(String::as_str).collect::<Vec<_>>().join(", ");
+    if !stage.run.is_empty() {
+        let more = if stage.run.len() > 8 { ", ..." } else { "" };
+        out.push_str(&format!("{:<12}   {shown}{more}\n", ""));
+    }
+    out
+}

@@ -1,0 +1,78 @@
+//! What a person sees while a command works: bars on a terminal, plain lines elsewhere. Everything goes to stderr.
+
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+/// Progress of one stage at a time.
+#[derive(Debug)]
+pub struct Progress {
+    terminal: bool,
+    quiet: bool,
+    bar: Option<ProgressBar>,
+    stage: String,
+    total: u64,
+    done: u64,
+    started: Instant,
+    said: Instant,
+}
+
+impl Progress {
+    /// Shows bars if stderr is a terminal; `quiet` shows nothing.
+    pub fn new(quiet: bool) -> Self {
+        let now = Instant::now();
+        let terminal = std::io::stderr().is_terminal();
+        Progress { terminal, quiet, bar: None, stage: String::new(), total: 0, done: 0, started: now, said: now }
+    }
+
+    /// Starts a stage of `total` steps.
+    pub fn begin(&mut self, stage: &str, total: usize) {
+        (self.stage, self.total, self.done) = (stage.to_owned(), total as u64, 0);
+        (self.started, self.said) = (Instant::now(), Instant::now());
+        if self.terminal && !self.quiet {
+            let bar = ProgressBar::new(total as u64);
+            let style = "{prefix:<12} {bar:30} {pos:>5}/{len} {per_sec:>10} {eta:>5} left  {msg}";
+            bar.set_style(ProgressStyle::with_template(style).expect("a valid template"));
+            bar.set_prefix(self.stage.clone());
+            bar.enable_steady_tick(Duration::from_millis(200));
+            self.bar = Some(bar);
+        }
+    }
+
+    /// Says what is being worked on.
+    pub fn working(&mut self, what: &str) {
+        if let Some(bar) = &self.bar {
+            bar.set_message(what.to_owned());
+        } else if !self.quiet && self.said.elapsed() > Duration::from_secs(2) {
+            self.said = Instant::now();
+            eprintln!("{:<12} {}/{} {what}", self.stage, self.done, self.total);
+        }
+    }
+
+    /// One step is done.
+    pub fn step(&mut self) {
+        self.done += 1;
+        if let Some(bar) = &self.bar {
+            bar.inc(1);
+        }
+    }
+
+    /// Ends the stage with a line.
+    pub fn end(&mut self, line: &str) {
+        if let Some(bar) = self.bar.take() {
+            bar.finish_and_clear();
+        }
+        if !self.quiet {
+            eprintln!("{:<12} {line} ({:.1} s)", self.stage, self.started.elapsed().as_secs_f64());
+        }
+    }
+
+    /// A line of its own.
+    pub fn say(&self, line: &str) {
+        match &self.bar {
+            _ if self.quiet => {}
+            Some(bar) => bar.println(line),
+            None => eprintln!("{line}"),
+        }
+    }
+}

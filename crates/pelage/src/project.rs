@@ -1,0 +1,272 @@
+//! A shot as it stands on disk: shot file, groom file, and every input file they name, found and hashed.
+
+use crate::Error;
+use crate::cache::FileHashes;
+use crate::config::{Document, Feature, GroomFile, ShotFile};
+use crate::format::csv;
+use pelage_geom::motion::RigidTransform;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// An input file and what is in it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct InputFile {
+    /// Where it is.
+    pub path: PathBuf,
+    /// The same for people: relative to the shot file's folder where it lies below it.
+    pub label: String,
+    /// BLAKE3 of its content.
+    pub hash: String,
+}
+
+/// Where the skin is at a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SkinAt {
+    /// At its rest pose.
+    Rest,
+    /// Moved as a whole.
+    Rigid(RigidTransform),
+    /// In a file of its own.
+    File(InputFile),
+}
+
+/// A shot with its input files.
+#[derive(Debug)]
+pub struct Project {
+    /// The shot file.
+    pub shot: Document<ShotFile>,
+    /// The groom file.
+    pub groom: Document<GroomFile>,
+    /// The rest pose.
+    pub rest: InputFile,
+    /// Curves that control hairs are drawn as, if they are.
+    pub drawn: Option<InputFile>,
+    /// The skin at every frame of the shot.
+    pub frames: BTreeMap<i32, SkinAt>,
+    /// Every map, by the path written in the groom file: UDIM number (0 without tiles) and file.
+    pub maps: BTreeMap<PathBuf, Vec<(u32, InputFile)>>,
+}
+
+impl Project {
+    /// Reads both files and finds every input they name.
+    pub fn open(shot_file: &Path) -> Result<Self, Error> {
+        let shot: Document<ShotFile> = Document::read(shot_file)?;
+        shot.check()?;
+        let groom_path = shot.resolve(&shot.value.groom.file);
+        if !groom_path.is_file() {
+            return Err(missing(&shot, "groom.file", &groom_path).into());
+        }
+        let groom: Document<GroomFile> = Document::read(&groom_path)?;
+        groom.check()?;
+        let mut hashes = FileHashes::open(&shot.resolve(&shot.value.cache.dir));
+        let mut find = Finder { base: shot.path.parent().unwrap_or(Path::new("")).to_path_buf(), hashes: &mut hashes };
+        let rest = find.file(&shot, "skin.rest", &shot.value.skin.rest)?;
+        let frames = find.frames(&shot)?;
+        let drawn = groom.value.control.placement.curves.as_ref();
+        let drawn = drawn.map(|p| find.file(&groom, "control.placement.curves", p)).transpose()?;
+        let mut maps = BTreeMap::new();
+        for (key, path) in named_maps(&groom.value) {
+            if !maps.contains_key(&path) {
+                let tiles = find.map(&groom, &key, &path)?;
+                maps.insert(path, tiles);
+            }
+        }
+        hashes.save();
+        Ok(Project { shot, groom, rest, drawn, frames, maps })
+    }
+
+    /// Folder of the shot's outputs.
+    pub fn out_dir(&self) -> PathBuf {
+        self.shot.resolve(&self.shot.value.export.dir).join(&self.shot.value.shot.name)
+    }
+
+    /// Folder of the cache.
+    pub fn cache_dir(&self) -> PathBuf {
+        self.shot.resolve(&self.shot.value.cache.dir)
+    }
+
+    /// Square centimetres in a square scene unit.
+    pub fn cm2_per_unit2(&self) -> f64 {
+        let cm = 100.0 * self.shot.value.shot.meters_per_unit;
+        cm * cm
+    }
+
+    /// Frame of the preview's still.
+    pub fn still_frame(&self) -> i32 {
+        let [first, last] = self.shot.value.shot.frames;
+        self.shot.value.preview.frame.unwrap_or(first + (last - first) / 2)
+    }
+
+    /// Frames of the contact sheet, evenly over the shot.
+    pub fn sheet_frames(&self) -> Vec<i32> {
+        let [first, last] = self.shot.value.shot.frames;
+        let n = i64::from(self.shot.value.preview.sheet).min(i64::from(last) - i64::from(first) + 1);
+        let at = |k: i64| first + ((i64::from(last) - i64::from(first)) * k / (n - 1).max(1)) as i32;
+        (0..n).map(at).collect()
+    }
+
+    /// Length of control hairs before combing, and the key that says so: their own, or the longest layer's value
+    /// without its map, so that painting lengths never combs again.
+    pub fn control_length(&self) -> (String, Feature) {
+        let groom = &self.groom.value;
+        if let Some(own) = &groom.control.length {
+            return ("control.length".to_owned(), own.clone());
+        }
+        let value = |i: usize| groom.layer[i].length.value;
+        let longest = (1..groom.layer.len()).fold(0, |best, i| if value(i) > value(best) { i } else { best });
+        let length = Feature { noise: 0.0, map: None, ..groom.layer[longest].length.clone() };
+        (format!("layer[{longest}].length"), length)
+    }
+
+    /// A path for people: relative to the shot file's folder where it lies below it.
+    pub fn label(&self, path: &Path) -> String {
+        label(self.shot.path.parent().unwrap_or(Path::new("")), path)
+    }
+}
+
+fn label(base: &Path, path: &Path) -> String {
+    path.strip_prefix(base).unwrap_or(path).display().to_string()
+}
+
+fn missing<T>(doc: &Document<T>, key: &str, path: &Path) -> crate::config::ConfigError {
+    doc.error(key, format!("there is no file {}", path.display()), "paths are relative to the file that names them")
+}
+
+/// Every map that a groom names, with the key that names it.
+fn named_maps(groom: &GroomFile) -> Vec<(String, PathBuf)> {
+    let mut out = Vec::new();
+    let mut add = |key: String, map: Option<&PathBuf>| out.extend(map.map(|m| (key, m.clone())));
+    add("control.length.map".into(), groom.control.length.as_ref().and_then(|f| f.map.as_ref()));
+    for (i, c) in groom.comb.iter().enumerate() {
+        add(format!("comb[{i}].region.map"), c.region.as_ref().map(|m| &m.map));
+        add(format!("comb[{i}].map.map"), c.map.as_ref().map(|m| &m.map));
+    }
+    for (i, l) in groom.layer.iter().enumerate() {
+        add(format!("layer[{i}].density.map"), l.density.map.as_ref());
+        add(format!("layer[{i}].on_off.map"), l.on_off.as_ref().map(|m| &m.map));
+        add(format!("layer[{i}].length.map"), l.length.map.as_ref());
+        add(format!("layer[{i}].width.map"), l.width.map.as_ref());
+        add(format!("layer[{i}].opacity.map"), l.opacity.map.as_ref());
+        add(format!("layer[{i}].color.map"), l.color.map.as_ref());
+    }
+    out
+}
+
+struct Finder<'a> {
+    base: PathBuf,
+    hashes: &'a mut FileHashes,
+}
+
+impl Finder<'_> {
+    fn file<T>(&mut self, doc: &Document<T>, key: &str, written: &Path) -> Result<InputFile, Error> {
+        self.found(doc, key, doc.resolve(written))
+    }
+
+    fn found<T>(&mut self, doc: &Document<T>, key: &str, path: PathBuf) -> Result<InputFile, Error> {
+        match self.hashes.hash(&path) {
+            Ok(hash) => Ok(InputFile { label: label(&self.base, &path), path, hash }),
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => Err(missing(doc, key, &path).into()),
+            Err(e) => Err(doc.error(key, format!("{}: {e}", path.display()), "").into()),
+        }
+    }
+
+    fn map<T>(&mut self, doc: &Document<T>, key: &str, written: &Path) -> Result<Vec<(u32, InputFile)>, Error> {
+        let path = doc.resolve(written);
+        let text = path.to_string_lossy().into_owned();
+        let Some((before, after)) = text.split_once("<UDIM>") else {
+            return Ok(vec![(0, self.found(doc, key, path)?)]);
+        };
+        let mut tiles = Vec::new();
+        for (number, path) in numbered(Path::new(before), after, 4) {
+            if (1001..=9999).contains(&number) {
+                tiles.push((number as u32, self.found(doc, key, path)?));
+            }
+        }
+        if tiles.is_empty() {
+            return Err(missing(doc, key, &path).into());
+        }
+        Ok(tiles)
+    }
+
+    fn frames(&mut self, doc: &Document<ShotFile>) -> Result<BTreeMap<i32, SkinAt>, Error> {
+        let (skin, shot) = (&doc.value.skin, &doc.value.shot);
+        let range = shot.frames[0]..=shot.frames[1];
+        if let Some(path) = &skin.motion {
+            let file = self.file(doc, "skin.motion", path)?;
+            let motion = csv::read_motion(&file.path, shot.meters_per_unit, shot.fps)?;
+            let start = skin.motion_start.unwrap_or(f64::from(shot.frames[0]));
+            let at = |f: i32| SkinAt::Rigid(motion.at((f64::from(f) - start) / shot.fps, skin.pivot));
+            return Ok(range.map(|f| (f, at(f))).collect());
+        }
+        let Some(pattern) = &skin.frames else {
+            return Ok(range.map(|f| (f, SkinAt::Rest)).collect());
+        };
+        let pattern = doc.resolve(pattern);
+        let text = pattern.to_string_lossy().into_owned();
+        let first = text.find('#').expect("checked: the pattern has a #");
+        let width = text[first..].chars().take_while(|c| *c == '#').count();
+        let files: BTreeMap<i64, PathBuf> =
+            numbered(Path::new(&text[..first]), &text[first + width..], 1).into_iter().collect();
+        let gone: Vec<i32> = range.clone().filter(|f| !files.contains_key(&i64::from(*f))).collect();
+        if !gone.is_empty() {
+            let what = format!("{} has no file for frame {}", pattern.display(), frame_list(&gone));
+            return Err(doc.error("skin.frames", what, "every frame of the shot needs a file").into());
+        }
+        range.map(|f| Ok((f, SkinAt::File(self.found(doc, "skin.frames", files[&i64::from(f)].clone())?)))).collect()
+    }
+}
+
+/// Files named `before` + digits + `after`, by number.
+fn numbered(before: &Path, after: &str, digits: usize) -> Vec<(i64, PathBuf)> {
+    let text = before.to_string_lossy();
+    let (folder, prefix) = text.rsplit_once('/').map_or((".", text.as_ref()), |(f, p)| (f, p));
+    let Ok(entries) = std::fs::read_dir(if folder.is_empty() { "/" } else { folder }) else { return Vec::new() };
+    let mut out: Vec<(i64, PathBuf)> = entries
+        .flatten()
+        .filter_map(|e| {
+            let name = e.file_name().to_string_lossy().into_owned();
+            let number = name.strip_prefix(prefix)?.strip_suffix(after)?;
+            let plain = number.strip_prefix('-').unwrap_or(number);
+            let good = plain.len() >= digits && plain.bytes().all(|b| b.is_ascii_digit());
+            Some((number.parse().ok().filter(|_| good)?, e.path()))
+        })
+        .collect();
+    out.sort();
+    out
+}
+
+/// "1001-1003, 1007".
+pub fn frame_list(frames: &[i32]) -> String {
+    let mut out: Vec<String> = Vec::new();
+    let mut i = 0;
+    while i < frames.len() {
+        let mut j = i;
+        while j + 1 < frames.len() && frames[j + 1] == frames[j] + 1 {
+            j += 1;
+        }
+        out.push(if i == j { frames[i].to_string() } else { format!("{}-{}", frames[i], frames[j]) });
+        i = j + 1;
+    }
+    out.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_listed_in_ranges() {
+        assert_eq!(frame_list(&[1, 2, 3, 7, 9, 10]), "1-3, 7, 9-10");
+        assert_eq!(frame_list(&[]), "");
+    }
+
+    #[test]
+    fn numbered_files_are_found_whatever_their_padding() {
+        let dir = tempfile::tempdir().unwrap();
+        for n in ["a.0007.ply", "a.8.ply", "a.x.ply", "b.0009.ply", "a.-3.ply"] {
+            std::fs::write(dir.path().join(n), "").unwrap();
+        }
+        let found = numbered(&dir.path().join("a."), ".ply", 1);
+        assert_eq!(found.iter().map(|f| f.0).collect::<Vec<_>>(), [-3, 7, 8]);
+    }
+}

@@ -1,0 +1,176 @@
+//! Export: finished hair for other programs. Every file is written beside its place, read back and checked, and only
+//! then renamed.
+
+use super::run::{Counts, Runner};
+use super::{Step, What, groom, instance, interpolate};
+use crate::Error;
+use crate::config::{ExportFormat, UpAxis};
+use crate::files::unfinished;
+use crate::format::{HairFrame, HairLayer, ShotFacts, mcap::McapHair, ply, usd::UsdHair};
+use pelage_geom::Offsets;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// A file that a step has written, as kept in the cache.
+#[derive(Debug, Serialize, Deserialize)]
+struct Receipt {
+    name: String,
+    bytes: u64,
+    blake3: String,
+}
+
+/// True if the files of a step lie in the output folder as they were written.
+pub fn is_written(run: &Runner<'_>, step: &Step) -> bool {
+    let out = run.project.out_dir();
+    let Some(entry) = run.store.get(&step.recipe.key()) else { return false };
+    let receipts: Option<Vec<Receipt>> = entry.payload.first().and_then(|b| serde_json::from_slice(b).ok());
+    receipts.is_some_and(|r| {
+        r.iter().all(|r| {
+            let path = out.join(&r.name);
+            path.metadata().is_ok_and(|m| m.len() == r.bytes) && run.file_hash(&path).is_some_and(|h| h == r.blake3)
+        })
+    })
+}
+
+/// Renames finished files into the output folder and keeps the receipt.
+pub fn publish(run: &mut Runner<'_>, what: What, files: Vec<(PathBuf, String)>) -> Result<(), Error> {
+    let out = run.project.out_dir();
+    let mut receipts = Vec::new();
+    for (part, name) in &files {
+        let blake3 = crate::cache::hash_file(part).map_err(Error::disk(part))?;
+        let bytes = part.metadata().map_err(Error::disk(part))?.len();
+        receipts.push(Receipt { name: name.clone(), bytes, blake3 });
+    }
+    for (part, name) in &files {
+        let place = out.join(name);
+        std::fs::rename(part, &place).map_err(Error::disk(&place))?;
+    }
+    let text = serde_json::to_vec(&receipts).expect("plain JSON");
+    let bytes = receipts.iter().map(|r| r.bytes).sum();
+    run.keep(what, Counts::from([("bytes".to_owned(), bytes)]), &[("files.json", &text)])
+}
+
+/// Files that vanish unless they are published.
+struct Parts(Vec<(PathBuf, String)>);
+
+impl Parts {
+    fn add(&mut self, out: &Path, name: String) -> PathBuf {
+        let part = unfinished(&out.join(&name));
+        self.0.push((part.clone(), name));
+        part
+    }
+}
+
+impl Drop for Parts {
+    fn drop(&mut self) {
+        for (part, _) in &self.0 {
+            let _ = std::fs::remove_file(part);
+        }
+    }
+}
+
+/// Facts of the shot that every file states.
+pub fn facts(run: &mut Runner<'_>) -> Result<ShotFacts, Error> {
+    let origin = groom::skin(run)?.origin();
+    let shot = &run.project.shot.value.shot;
+    Ok(ShotFacts {
+        name: shot.name.clone(),
+        meters_per_unit: shot.meters_per_unit,
+        up: if shot.up == UpAxis::Y { 'Y' } else { 'Z' },
+        fps: shot.fps,
+        frames: run.project.frames.keys().copied().collect(),
+        origin,
+        extra: vec![("generator".into(), concat!("pelage ", env!("CARGO_PKG_VERSION")).into())],
+    })
+}
+
+/// The parts of a layer that do not change over the shot.
+pub fn hair_layer(run: &mut Runner<'_>, i: usize) -> Result<HairLayer, Error> {
+    let skin = groom::skin(run)?;
+    let roots = instance::roots(run, i)?;
+    let width = instance::column(run, What::Width(i), i)?;
+    let opacity = instance::column(run, What::Opacity(i), i)?;
+    let color = instance::color(run, i)?;
+    let rest = interpolate::positions(run, What::Rest(i))?;
+    let groom = &run.project.groom.value;
+    let points = groom.layer[i].points.unwrap_or(groom.control.points);
+    let unit_per_micrometre = (1e-6 / run.project.shot.value.shot.meters_per_unit) as f32;
+    let tip = groom.layer[i].width.tip as f32;
+    let taper: Vec<f32> = (0..points).map(|k| 1.0 + (tip - 1.0) * (k as f32 / (points - 1) as f32)).collect();
+    Ok(HairLayer {
+        name: groom.layer[i].name.clone(),
+        offsets: Offsets::uniform(roots.id.len(), points),
+        skin_face: roots.root.iter().map(|p| skin.mesh.face[p.triangle as usize] as i32).collect(),
+        skin_bary: roots.root.iter().map(|p| p.bary).collect(),
+        id: roots.id,
+        root_uv: roots.uv,
+        rest,
+        width: width.iter().flat_map(|w| taper.iter().map(move |t| w * unit_per_micrometre * t)).collect(),
+        color,
+        opacity: opacity.iter().map(|o| o.clamp(0.0, 1.0)).collect(),
+    })
+}
+
+/// Writes one format.
+pub fn write(run: &mut Runner<'_>, what: What, format: ExportFormat) -> Result<(), Error> {
+    let out = run.project.out_dir();
+    std::fs::create_dir_all(&out).map_err(Error::disk(&out))?;
+    let facts = facts(run)?;
+    let count = run.project.groom.value.layer.len();
+    let layers = (0..count).map(|i| hair_layer(run, i)).collect::<Result<Vec<_>, _>>()?;
+    let mut parts = Parts(Vec::new());
+    match format {
+        ExportFormat::Usd => {
+            let part = parts.add(&out, "hair.usdc".into());
+            let mut file = UsdHair::create(&part, &facts, &layers)?;
+            frames(run, &facts, |frame, hair| Ok(file.write_frame(frame, hair)?))?;
+            file.finish()?;
+            crate::format::usd::verify(&part, &facts, &layers)?;
+        }
+        ExportFormat::Mcap => {
+            let part = parts.add(&out, "hair.mcap".into());
+            let mut file = McapHair::create(&part, &facts, &layers)?;
+            frames(run, &facts, |frame, hair| Ok(file.write_frame(frame, hair)?))?;
+            file.finish()?;
+            crate::format::mcap::verify(&part, &facts, &layers)?;
+        }
+        ExportFormat::Ply => frames(run, &facts, |frame, hair| {
+            let part = parts.add(&out, format!("hair.{frame:04}.ply"));
+            ply::write_hair(&part, &facts, &layers, hair)?;
+            ply::verify_hair(&part, &layers, hair)?;
+            Ok(())
+        })?,
+    }
+    publish(run, what, std::mem::take(&mut parts.0))
+}
+
+/// Hands out every frame in order with its velocities: the forward difference to the next frame, the backward one at
+/// the last, per second. Two frames are in memory at a time.
+fn frames(
+    run: &mut Runner<'_>,
+    facts: &ShotFacts,
+    mut write: impl FnMut(i32, &[HairFrame<'_>]) -> Result<(), Error>,
+) -> Result<(), Error> {
+    let count = run.project.groom.value.layer.len();
+    let load = |run: &mut Runner<'_>, f: i32| {
+        (0..count).map(|i| interpolate::positions(run, What::Frame(i, f))).collect::<Result<Vec<_>, Error>>()
+    };
+    let mut now = load(run, facts.frames[0])?;
+    let mut velocity: Vec<Vec<[f32; 3]>> = now.iter().map(|p| vec![[0.0; 3]; p.len()]).collect();
+    for (k, &frame) in facts.frames.iter().enumerate() {
+        let next = facts.frames.get(k + 1).map(|f| load(run, *f)).transpose()?;
+        if let Some(next) = &next {
+            let rate = (facts.fps / f64::from(facts.frames[k + 1] - frame)) as f32;
+            for (v, (a, b)) in velocity.iter_mut().zip(now.iter().zip(next)) {
+                for (v, (a, b)) in v.iter_mut().zip(a.iter().zip(b)) {
+                    *v = std::array::from_fn(|x| (b[x] - a[x]) * rate);
+                }
+            }
+        }
+        let hair: Vec<HairFrame<'_>> =
+            now.iter().zip(&velocity).map(|(position, velocity)| HairFrame { position, velocity }).collect();
+        write(frame, &hair)?;
+        now = next.unwrap_or_default();
+    }
+    Ok(())
+}

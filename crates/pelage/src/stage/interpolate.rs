@@ -1,0 +1,74 @@
+//! Interpolate: every hair at every frame, from control hairs on the skin of that frame.
+
+use super::run::{Counts, Runner};
+use super::{What, groom, instance};
+use crate::Error;
+use crate::format::mcap;
+use crate::project::SkinAt;
+use pelage_geom::SurfacePoint;
+use pelage_groom::interpolate::{Blend, interpolate, pose_controls, root_positions};
+use std::rc::Rc;
+
+/// What the interpolator reads of a layer, one entry a hair.
+#[derive(Debug)]
+pub struct LayerHairs {
+    /// Points of a hair.
+    pub points: usize,
+    /// Roots on the rest skin.
+    pub root: Vec<SurfacePoint>,
+    /// Control hairs.
+    pub hair: Vec<[u32; 3]>,
+    /// Their weights.
+    pub weight: Vec<[f32; 3]>,
+    /// Lengths, scene units.
+    pub length: Vec<f32>,
+}
+
+fn layer(run: &mut Runner<'_>, i: usize) -> Result<Rc<LayerHairs>, Error> {
+    if let Some(found) = run.layers.get(&i) {
+        return Ok(found.clone());
+    }
+    let root = instance::roots(run, i)?.root;
+    let (hair, weight) = instance::weights(run, i)?;
+    let length = instance::column(run, What::Length(i), i)?;
+    let groom = &run.project.groom.value;
+    let points = groom.layer[i].points.unwrap_or(groom.control.points);
+    let found = Rc::new(LayerHairs { points, root, hair, weight, length });
+    run.layers.insert(i, found.clone());
+    Ok(found)
+}
+
+/// Positions of a layer's hairs at rest or at a frame, scene units relative to the skin's origin, hair after hair.
+pub fn positions(run: &mut Runner<'_>, what: What) -> Result<Vec<[f32; 3]>, Error> {
+    let (i, at) = match what {
+        What::Rest(i) => (i, SkinAt::Rest),
+        What::Frame(i, f) => (i, run.project.frames[&f].clone()),
+        other => unreachable!("{other:?} has no positions"),
+    };
+    if let Some(entry) = run.fetch(what)
+        && let Some(found) = entry.payload.into_iter().next().and_then(|b| mcap::read_frame_payload(&b).ok())
+        && let Some(first) = found.into_iter().next()
+    {
+        return Ok(first);
+    }
+    let skin = groom::skin(run)?;
+    let control = groom::combed(run)?;
+    let layer = layer(run, i)?;
+    let pose = skin.pose(&at)?;
+    let control = pose_controls(&control, &skin.mesh, &skin.topology, &pose, layer.points);
+    let root = root_positions(&skin.mesh, &pose, &layer.root, skin.origin());
+    let blend = Blend { root: &root, hair: &layer.hair, weight: &layer.weight, length: &layer.length };
+    let mut out = vec![[0.0f32; 3]; layer.root.len() * layer.points];
+    let found = interpolate(&blend, &control, &mut out);
+    let counts = Counts::from([
+        ("hairs".to_owned(), layer.root.len() as u64),
+        ("points".to_owned(), out.len() as u64),
+        ("hairs with cancelled directions".to_owned(), found.cancelled_hairs as u64),
+    ]);
+    let name = run.plan.step(what).name.clone();
+    let frame = if let What::Frame(_, f) = what { f } else { 0 };
+    let mut file = std::io::Cursor::new(Vec::with_capacity(out.len() * 12 + 4096));
+    mcap::write_frame_payload(&mut file, &name, frame, &[&out])?;
+    run.keep(what, counts, &[("frame.mcap", file.get_ref())])?;
+    Ok(out)
+}

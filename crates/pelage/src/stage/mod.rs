@@ -1,0 +1,49 @@
+//! The stages of a shot. `plan` says what each step reads; a stage file runs its steps: read, call one pure function,
+//! write.
+
+mod plan;
+mod run;
+mod skin;
+
+pub mod export;
+pub mod groom;
+pub mod instance;
+pub mod interpolate;
+pub mod preview;
+pub mod tables;
+
+pub use plan::{Plan, Step, What, candidate_density, layer_seed};
+pub use run::{Options, PlannedStage, Runner};
+pub use skin::{Skin, SkinPose};
+
+/// A stage, in the order of the flow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Stage {
+    /// Control hairs placed and combed; once per groom.
+    Groom,
+    /// Roots, weights and features of every hair; once per groom.
+    Instance,
+    /// Every hair at every frame.
+    Interpolate,
+    /// Files for other programs.
+    Export,
+    /// Pictures.
+    Preview,
+}
+
+impl Stage {
+    /// All stages in order.
+    pub const ALL: [Stage; 5] = [Stage::Groom, Stage::Instance, Stage::Interpolate, Stage::Export, Stage::Preview];
+
+    /// Name as typed on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Stage::Groom => "groom",
+            Stage::Instance => "instance",
+            Stage::Interpolate => "interpolate",
+            Stage::Export => "export",
+            Stage::Preview => "preview",
+        }
+    }
+}

@@ -1,0 +1,381 @@
+//! Every step of a shot with its recipe: what each step reads, and nothing else, enters its key.
+
+use super::Stage;
+use crate::cache::{Field, Recipe};
+use crate::config::{Comb, ExportFormat, Feature, MapRef, Parting};
+use crate::project::{Project, SkinAt};
+use std::collections::BTreeMap;
+
+/// What a step makes. Layers are numbered as in the groom file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum What {
+    /// Sites and roots of the control hairs.
+    Place,
+    /// Control hairs after combing.
+    Comb,
+    /// Blue-noise candidate roots for a layer.
+    Candidates(usize),
+    /// Roots of a layer's hairs.
+    Roots(usize),
+    /// The three control hairs and weights of every hair of a layer.
+    Weights(usize),
+    /// Lengths.
+    Length(usize),
+    /// Root diameters.
+    Width(usize),
+    /// Opacities.
+    Opacity(usize),
+    /// Colours.
+    Color(usize),
+    /// A layer's hairs at the rest pose.
+    Rest(usize),
+    /// A layer's hairs at a frame.
+    Frame(usize, i32),
+    /// An exported file, or one per frame.
+    Export(ExportFormat),
+    /// The preview picture.
+    Still,
+    /// The contact sheet over frames.
+    Sheet,
+}
+
+/// A step of a shot.
+#[derive(Clone, Debug)]
+pub struct Step {
+    /// What it makes.
+    pub what: What,
+    /// Its name over runs: `instance/length/scalp`, `interpolate/scalp/1001`.
+    pub name: String,
+    /// Its stage.
+    pub stage: Stage,
+    /// Everything it reads.
+    pub recipe: Recipe,
+    /// The steps it reads.
+    pub reads: Vec<What>,
+}
+
+/// Every step of a shot, in an order in which each comes after what it reads.
+#[derive(Debug)]
+pub struct Plan {
+    /// The steps.
+    pub steps: Vec<Step>,
+    index: BTreeMap<What, usize>,
+}
+
+/// Versions of the stages' results. Raise one whenever its code gives other bytes for the same input.
+mod version {
+    pub const PLACE: u32 = 1;
+    pub const COMB: u32 = 1;
+    pub const CANDIDATES: u32 = 1;
+    pub const ROOTS: u32 = 1;
+    pub const WEIGHTS: u32 = 1;
+    pub const COLUMN: u32 = 1;
+    pub const INTERPOLATE: u32 = 1;
+    pub const EXPORT: u32 = 1;
+    pub const PREVIEW: u32 = 1;
+}
+
+/// Candidates are made for the next power of two of the density, hairs per square centimetre, so that tweaking a
+/// density within it finds them in the cache. A finer step would recompute more often, a coarser one makes more
+/// candidates than are used (up to twice as many as it is).
+pub fn candidate_density(per_cm2: f64) -> f64 {
+    let mut level = 1.0 / 1024.0;
+    while level < per_cm2 {
+        level *= 2.0;
+    }
+    level
+}
+
+/// Seed of a layer's random numbers and the upper half of its hair ids: 31 bits of its name's hash.
+pub fn layer_seed(name: &str) -> u32 {
+    let hash = blake3::hash(name.as_bytes());
+    u32::from_le_bytes(hash.as_bytes()[..4].try_into().expect("four bytes")) >> 1
+}
+
+impl Plan {
+    /// Plans a shot.
+    pub fn new(project: &Project) -> Self {
+        let mut plan = Plan { steps: Vec::new(), index: BTreeMap::new() };
+        let r = Reader { project, groom: project.label(&project.groom.path), shot: project.label(&project.shot.path) };
+        plan.add(What::Place, "groom/place".into(), Stage::Groom, r.place(), &[]);
+        plan.add(What::Comb, "groom/comb".into(), Stage::Groom, r.comb(), &[What::Place]);
+        for (i, layer) in project.groom.value.layer.iter().enumerate() {
+            let name = |part: &str| format!("instance/{part}/{}", layer.name);
+            let mut add = |what, part: &str, recipe, reads: &[What]| {
+                plan.add(what, name(part), Stage::Instance, recipe, reads);
+            };
+            let column = |part: &str, f: &Feature| {
+                Recipe::new(&format!("instance/{part}"), version::COLUMN).with(r.feature(part, &format!("layer[{i}].{part}"), f))
+            };
+            add(What::Candidates(i), "candidates", r.candidates(i), &[]);
+            add(What::Roots(i), "roots", r.roots(i), &[What::Candidates(i)]);
+            add(What::Weights(i), "weights", Recipe::new("instance/weights", version::WEIGHTS), &[What::Place, What::Roots(i)]);
+            add(What::Length(i), "length", column("length", &layer.length), &[What::Roots(i)]);
+            add(What::Width(i), "width", column("width", &layer.width.feature()), &[What::Roots(i)]);
+            add(What::Opacity(i), "opacity", column("opacity", &layer.opacity), &[What::Roots(i)]);
+            add(What::Color(i), "color", r.color(i), &[What::Roots(i)]);
+        }
+        for (i, layer) in project.groom.value.layer.iter().enumerate() {
+            let reads = [What::Comb, What::Roots(i), What::Weights(i), What::Length(i)];
+            let name = format!("interpolate/{}/rest", layer.name);
+            plan.add(What::Rest(i), name, Stage::Interpolate, r.frame(i, &SkinAt::Rest, 0), &reads);
+        }
+        for (frame, at) in &project.frames {
+            for (i, layer) in project.groom.value.layer.iter().enumerate() {
+                let reads = [What::Comb, What::Roots(i), What::Weights(i), What::Length(i)];
+                let name = format!("interpolate/{}/{frame}", layer.name);
+                plan.add(What::Frame(i, *frame), name, Stage::Interpolate, r.frame(i, at, *frame), &reads);
+            }
+        }
+        let layers = 0..project.groom.value.layer.len();
+        let columns = layers.clone().flat_map(|i| [What::Width(i), What::Opacity(i), What::Color(i)]);
+        let look: Vec<What> = columns.collect();
+        let mut all = look.clone();
+        all.extend(layers.clone().map(What::Rest));
+        all.extend(project.frames.keys().flat_map(|f| layers.clone().map(|i| What::Frame(i, *f))));
+        for format in &project.shot.value.export.formats {
+            let name = format!("export/{}", format.name());
+            plan.add(What::Export(*format), name, Stage::Export, r.export(*format), &all);
+        }
+        let of = |frames: &[i32]| {
+            let frames = frames.iter().flat_map(|f| layers.clone().map(|i| What::Frame(i, *f)));
+            look.iter().copied().chain(frames).collect::<Vec<What>>()
+        };
+        let still = of(&[project.still_frame()]);
+        plan.add(What::Still, "preview/still".into(), Stage::Preview, r.picture(), &still);
+        let sheet = of(&project.sheet_frames());
+        plan.add(What::Sheet, "preview/sheet".into(), Stage::Preview, r.picture().param("sheet", true, ""), &sheet);
+        plan
+    }
+
+    fn add(&mut self, what: What, name: String, stage: Stage, mut recipe: Recipe, reads: &[What]) {
+        for input in reads {
+            let step = self.step(*input);
+            recipe = recipe.step(&step.name.clone(), &step.recipe.key());
+        }
+        self.index.insert(what, self.steps.len());
+        self.steps.push(Step { what, name, stage, recipe, reads: reads.to_vec() });
+    }
+
+    /// The step that makes something. Panics if the shot has no such step.
+    pub fn step(&self, what: What) -> &Step {
+        &self.steps[self.index[&what]]
+    }
+
+    /// Why a step is not what it was in the last run: its own changes, and those of what it reads.
+    pub fn reasons(&self, what: What, last: &BTreeMap<String, Recipe>) -> Vec<String> {
+        let step = self.step(what);
+        let mut out = match last.get(&step.name) {
+            Some(before) if before.key() == step.recipe.key() => return Vec::new(),
+            Some(before) => step.recipe.changes(before),
+            None => Vec::new(),
+        };
+        for input in &step.reads {
+            for reason in self.reasons(*input, last) {
+                if !out.contains(&reason) {
+                    out.push(reason);
+                }
+            }
+        }
+        out
+    }
+}
+
+impl ExportFormat {
+    /// Name as written in the shot file.
+    pub fn name(self) -> &'static str {
+        match self {
+            ExportFormat::Usd => "usd",
+            ExportFormat::Mcap => "mcap",
+            ExportFormat::Ply => "ply",
+        }
+    }
+}
+
+/// Builds recipes from a project; `groom` and `shot` are the files' labels.
+struct Reader<'a> {
+    project: &'a Project,
+    groom: String,
+    shot: String,
+}
+
+impl Reader<'_> {
+    fn in_groom(&self, key: &str) -> String {
+        format!("{}: {key}", self.groom)
+    }
+
+    fn in_shot(&self, key: &str) -> String {
+        format!("{}: {key}", self.shot)
+    }
+
+    fn rest(&self, recipe: Recipe) -> Recipe {
+        recipe.file("rest", &self.project.rest.hash, self.project.rest.label.clone())
+    }
+
+    /// Scale between scene units and the units of a groom file.
+    fn unit(&self, recipe: Recipe) -> Recipe {
+        let unit = self.project.shot.value.shot.meters_per_unit;
+        recipe.param("meters_per_unit", unit, self.in_shot("shot.meters_per_unit"))
+    }
+
+    fn map(&self, name: &str, m: &MapRef) -> Vec<Field> {
+        let mut recipe = Recipe::new("", 0);
+        for (tile, file) in &self.project.maps[&m.map] {
+            recipe = recipe.file(&format!("{name}.map.{tile}"), &file.hash, file.label.clone());
+        }
+        let key = self.in_groom(name);
+        let recipe = recipe.param(&format!("{name}.channel"), format!("{:?}", m.channel), format!("{key}.channel"));
+        recipe.param(&format!("{name}.wrap"), format!("{:?}", m.wrap), format!("{key}.wrap")).fields
+    }
+
+    /// Fields of a feature; `name` is what it is to the step, `key` where the groom file has it.
+    fn feature(&self, name: &str, key: &str, f: &Feature) -> Vec<Field> {
+        let at = self.in_groom(key);
+        let recipe = Recipe::new("", 0).param(&format!("{name}.value"), f.value, format!("{at}.value"));
+        let recipe = recipe.param(&format!("{name}.noise"), f.noise, format!("{at}.noise"));
+        let map = f.map.clone().map(|map| MapRef { map, channel: f.channel, wrap: f.wrap });
+        recipe.with(map.iter().flat_map(|m| self.map(name, m))).fields
+    }
+
+    fn place(&self) -> Recipe {
+        let control = &self.project.groom.value.control;
+        let mut r = self.unit(self.rest(Recipe::new("groom/place", version::PLACE)));
+        let p = &control.placement;
+        let at = self.in_groom("control.placement");
+        if let Some(d) = p.per_cm2 {
+            r = r.param("per_cm2", d, format!("{at}.per_cm2"));
+        }
+        if let Some([u, v]) = p.grid {
+            r = r.param("grid", format!("{u} x {v}"), format!("{at}.grid"));
+        }
+        if let Some(drawn) = &self.project.drawn {
+            r = r.file("curves", &drawn.hash, drawn.label.clone());
+        }
+        for (i, Parting { points, .. }) in self.project.groom.value.parting.iter().enumerate() {
+            r = r.param(&format!("parting[{i}]"), format!("{points:?}"), self.in_groom(&format!("parting[{i}].points")));
+        }
+        r
+    }
+
+    fn comb(&self) -> Recipe {
+        let groom = &self.project.groom.value;
+        let mut r = self.unit(self.rest(Recipe::new("groom/comb", version::COMB)));
+        r = r.param("points", groom.control.points, self.in_groom("control.points"));
+        let (key, length) = self.project.control_length();
+        r = r.with(self.feature("length", &key, &length));
+        for (i, c) in groom.comb.iter().enumerate() {
+            r = self.comb_fields(r, i, c);
+        }
+        let control = &groom.control;
+        r = r.param("push_up", control.push_up, self.in_groom("control.push_up"));
+        if control.push_up {
+            r = r.param("clearance", control.clearance, self.in_groom("control.clearance"));
+        }
+        r
+    }
+
+    fn comb_fields(&self, mut r: Recipe, i: usize, c: &Comb) -> Recipe {
+        let name = |key: &str| format!("comb[{i}].{key}");
+        let mut add = |key: &str, value: Option<String>| {
+            if let Some(value) = value {
+                r = std::mem::replace(&mut r, Recipe::new("", 0)).param(&name(key), value, self.in_groom(&name(key)));
+            }
+        };
+        add("kind", Some(format!("{:?}", c.kind)));
+        add("weight", Some(c.weight.to_string()));
+        add("points", c.points.as_ref().map(|p| format!("{p:?}")));
+        add("radius", c.radius.map(|x| x.to_string()));
+        add("falloff", c.falloff.map(|x| x.to_string()));
+        add("bend", c.bend.map(|x| x.to_string()));
+        add("curvature", Some(c.curvature.to_string()));
+        // A parting's name means nothing by itself: its place in the list does.
+        let parting = |n: &String| self.project.groom.value.parting.iter().position(|p| p.name == *n);
+        add("parting", c.parting.as_ref().and_then(parting).map(|p| p.to_string()));
+        add("side", c.side.map(|s| format!("{s:?}")));
+        add("space", c.space.map(|s| format!("{s:?}")));
+        add("angle", c.angle.map(|x| x.to_string()));
+        add("amount", c.amount.map(|x| x.to_string()));
+        add("value", c.value.map(|x| x.to_string()));
+        for (key, map) in [("region", &c.region), ("map", &c.map)] {
+            r = r.with(map.iter().flat_map(|m| self.map(&name(key), m)));
+        }
+        r
+    }
+
+    fn candidates(&self, i: usize) -> Recipe {
+        let layer = &self.project.groom.value.layer[i];
+        let at = self.in_groom(&format!("layer[{i}]"));
+        let r = self.unit(self.rest(Recipe::new("instance/candidates", version::CANDIDATES)));
+        let r = r.param("seed", layer_seed(&layer.name), format!("{at}.name"));
+        r.param("per_cm2", candidate_density(layer.density.value), format!("{at}.density.value (candidates)"))
+    }
+
+    fn roots(&self, i: usize) -> Recipe {
+        let layer = &self.project.groom.value.layer[i];
+        let r = Recipe::new("instance/roots", version::ROOTS);
+        let r = r.with(self.feature("density", &format!("layer[{i}].density"), &layer.density));
+        r.with(layer.on_off.iter().flat_map(|m| self.map(&format!("layer[{i}].on_off"), m)))
+    }
+
+    fn color(&self, i: usize) -> Recipe {
+        let c = &self.project.groom.value.layer[i].color;
+        let at = self.in_groom(&format!("layer[{i}].color"));
+        let r = Recipe::new("instance/color", version::COLUMN);
+        let r = r.param("value", format!("{:?}", c.value), format!("{at}.value"));
+        let r = r.param("noise", c.noise, format!("{at}.noise"));
+        let map = c.map.clone().map(|map| MapRef { map, channel: Default::default(), wrap: c.wrap });
+        r.with(map.iter().flat_map(|m| self.map("color", m)))
+    }
+
+    fn frame(&self, i: usize, at: &SkinAt, frame: i32) -> Recipe {
+        let layer = &self.project.groom.value.layer[i];
+        let points = layer.points.unwrap_or(self.project.groom.value.control.points);
+        let r = Recipe::new("interpolate", version::INTERPOLATE);
+        let r = r.param("points", points, self.in_groom(&format!("layer[{i}].points")));
+        match at {
+            SkinAt::Rest => r.param("skin", "rest", "the skin's rest pose"),
+            SkinAt::Rigid(t) => {
+                let motion = self.project.shot.value.skin.motion.as_ref().expect("a rigid skin has a motion");
+                let file = self.project.label(&self.project.shot.resolve(motion));
+                r.file("skin", &format!("{t:?}"), format!("{file} at frame {frame}"))
+            }
+            SkinAt::File(file) => r.file("skin", &file.hash, file.label.clone()),
+        }
+    }
+
+    fn export(&self, format: ExportFormat) -> Recipe {
+        let s = &self.project.shot.value.shot;
+        let mut r = Recipe::new("export", version::EXPORT).param("format", format.name(), "format");
+        for (key, value) in [
+            ("name", s.name.clone()),
+            ("fps", s.fps.to_string()),
+            ("up", format!("{:?}", s.up)),
+            ("meters_per_unit", s.meters_per_unit.to_string()),
+            ("frames", format!("{:?}", s.frames)),
+        ] {
+            r = r.param(key, value, self.in_shot(&format!("shot.{key}")));
+        }
+        for (i, layer) in self.project.groom.value.layer.iter().enumerate() {
+            let at = format!("layer[{i}].width.tip");
+            r = r.param(&at, layer.width.tip, self.in_groom(&at));
+        }
+        r
+    }
+
+    fn picture(&self) -> Recipe {
+        let p = &self.project.shot.value.preview;
+        let mut r = self.rest(Recipe::new("preview", version::PREVIEW));
+        for (key, value) in [
+            ("size", format!("{:?}", p.size)),
+            ("from", format!("{:?}", p.from)),
+            ("zoom", p.zoom.to_string()),
+        ] {
+            r = r.param(key, value, self.in_shot(&format!("preview.{key}")));
+        }
+        for (i, layer) in self.project.groom.value.layer.iter().enumerate() {
+            let at = format!("layer[{i}].width.tip");
+            r = r.param(&at, layer.width.tip, self.in_groom(&at));
+        }
+        r.param("up", format!("{:?}", self.project.shot.value.shot.up), self.in_shot("shot.up"))
+    }
+}

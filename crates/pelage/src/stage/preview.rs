@@ -1,0 +1,115 @@
+//! Preview: pictures of the hair by which a groom is judged.
+
+use super::run::Runner;
+use super::{What, export, groom, instance, interpolate};
+use crate::Error;
+use crate::config::UpAxis;
+use crate::files::unfinished;
+use crate::format::{HairLayer, image::write_png};
+use pelage_light::{Camera, HairView, Image, Scene, Settings, SkinView, contact_sheet, render, studio_lights};
+
+/// Linear grey of the background: dark enough for light hair, light enough for dark hair.
+const BACKGROUND: [f32; 3] = [0.16, 0.17, 0.19];
+/// Linear colour of skin, a neutral warm clay.
+const SKIN: [f32; 3] = [0.42, 0.31, 0.26];
+
+/// Draws the still.
+pub fn still(run: &mut Runner<'_>) -> Result<(), Error> {
+    let frame = run.project.still_frame();
+    let layers = layers(run)?;
+    let camera = camera(run, &layers, &[frame])?;
+    let picture = draw(run, &layers, &camera, frame, run.project.shot.value.preview.size)?;
+    save(run, What::Still, "preview.png", &picture)
+}
+
+/// Draws the contact sheet: frames evenly over the shot, each a third of the still's size, seen by one camera.
+pub fn sheet(run: &mut Runner<'_>) -> Result<(), Error> {
+    let frames = run.project.sheet_frames();
+    let layers = layers(run)?;
+    let camera = camera(run, &layers, &frames)?;
+    let size = run.project.shot.value.preview.size.map(|x| (x / 3).max(16));
+    let mut pictures = Vec::new();
+    for frame in &frames {
+        let mut picture = draw(run, &layers, &camera, *frame, size)?;
+        picture.draw_number(i64::from(*frame), 2);
+        pictures.push(picture);
+    }
+    let columns = (1..=frames.len()).find(|c| c * c >= frames.len()).unwrap_or(1);
+    save(run, What::Sheet, "sheet.png", &contact_sheet(&pictures, columns))
+}
+
+fn layers(run: &mut Runner<'_>) -> Result<Vec<HairLayer>, Error> {
+    (0..run.project.groom.value.layer.len()).map(|i| export::hair_layer(run, i)).collect()
+}
+
+/// A camera that sees skin and hair at all of the frames.
+fn camera(run: &mut Runner<'_>, layers: &[HairLayer], frames: &[i32]) -> Result<Camera, Error> {
+    let skin = groom::skin(run)?;
+    let origin = skin.origin();
+    let mut low = [f64::INFINITY; 3];
+    let mut high = [f64::NEG_INFINITY; 3];
+    let mut add = |p: [f64; 3]| {
+        for x in 0..3 {
+            (low[x], high[x]) = (low[x].min(p[x]), high[x].max(p[x]));
+        }
+    };
+    for frame in frames {
+        skin.pose(&run.project.frames[frame])?.position.iter().for_each(|p| add(*p));
+        for i in 0..layers.len() {
+            let position = interpolate::positions(run, What::Frame(i, *frame))?;
+            position.iter().for_each(|p| add(std::array::from_fn(|x| f64::from(p[x]) + origin[x])));
+        }
+    }
+    let shot = &run.project.shot.value;
+    let up = if shot.shot.up == UpAxis::Y { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] };
+    let aspect = f64::from(shot.preview.size[0]) / f64::from(shot.preview.size[1]);
+    // Zooming in frames a smaller box about the same middle.
+    let half = 0.5 / shot.preview.zoom;
+    let shrunk = |sign: f64| std::array::from_fn(|x| 0.5 * (low[x] + high[x]) + sign * half * (high[x] - low[x]));
+    Ok(Camera::frame((shrunk(-1.0), shrunk(1.0)), shot.preview.from.map(|x| -x), up, aspect))
+}
+
+fn draw(
+    run: &mut Runner<'_>,
+    layers: &[HairLayer],
+    camera: &Camera,
+    frame: i32,
+    size: [u32; 2],
+) -> Result<Image, Error> {
+    let skin = groom::skin(run)?;
+    let pose = skin.pose(&run.project.frames[&frame])?;
+    let positions = (0..layers.len())
+        .map(|i| interpolate::positions(run, What::Frame(i, frame)))
+        .collect::<Result<Vec<_>, Error>>()?;
+    let normals = (0..layers.len())
+        .map(|i| Ok(instance::roots(run, i)?.root.iter().map(|p| skin.normal(&pose, p)).collect()))
+        .collect::<Result<Vec<Vec<[f32; 3]>>, Error>>()?;
+    let views: Vec<HairView<'_>> = (0..layers.len())
+        .map(|i| HairView {
+            offsets: &layers[i].offsets,
+            position: &positions[i],
+            origin: skin.origin(),
+            width: &layers[i].width,
+            color: &layers[i].color,
+            opacity: &layers[i].opacity,
+            root_normal: &normals[i],
+        })
+        .collect();
+    let lights = studio_lights(camera);
+    let surface = SkinView {
+        position: &pose.position,
+        triangle: &skin.mesh.triangle,
+        normal: &pose.normal,
+        color: SKIN,
+    };
+    let scene = Scene { skin: Some(surface), layers: &views, lights: &lights, background: BACKGROUND };
+    Ok(render(&scene, camera, size[0] as usize, size[1] as usize, &Settings::default()).0)
+}
+
+fn save(run: &mut Runner<'_>, what: What, name: &str, picture: &Image) -> Result<(), Error> {
+    let out = run.project.out_dir();
+    std::fs::create_dir_all(&out).map_err(Error::disk(&out))?;
+    let part = unfinished(&out.join(name));
+    write_png(&part, picture.width, picture.height, &picture.to_srgb8())?;
+    export::publish(run, what, vec![(part, name.to_owned())])
+}

@@ -1,0 +1,295 @@
+//! Brings a shot up to date: walks the plan, runs what is not in the cache, and says why.
+
+use super::{Plan, Stage, Step, What, skin};
+use crate::Error;
+use crate::cache::{Entry, FileHashes, Recipe, Store};
+use crate::config::MapRef;
+use crate::progress::Progress;
+use crate::project::{Project, frame_list};
+use crate::report::{Report, StageReport, cpu_seconds, peak_bytes};
+use pelage_geom::TiledMap;
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::rc::Rc;
+use std::time::Instant;
+
+/// Counts by name, as a step reports them.
+pub type Counts = BTreeMap<String, u64>;
+
+/// What to bring up to date.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Last stage; all if none.
+    pub to: Option<Stage>,
+    /// Frames; all if none.
+    pub frames: Option<BTreeSet<i32>>,
+    /// A stage that runs again whether its results are there or not.
+    pub force: Option<Stage>,
+    /// A stage to leave out.
+    pub without: Option<Stage>,
+    /// Make the contact sheet too.
+    pub sheet: bool,
+}
+
+/// What would run in a stage, and why.
+#[derive(Clone, Debug, Default, serde::Serialize)]
+pub struct PlannedStage {
+    /// Name of the stage.
+    pub name: String,
+    /// Steps that would run, by name.
+    pub run: Vec<String>,
+    /// Steps found finished.
+    pub reused: usize,
+    /// What changed since the last run.
+    pub reasons: Vec<String>,
+}
+
+/// A run over one shot: the plan, the cache, and what has been read so far.
+pub struct Runner<'a> {
+    /// The shot.
+    pub project: &'a Project,
+    /// Its steps.
+    pub plan: Plan,
+    /// The cache.
+    pub store: Store,
+    /// Warnings of the stage that runs.
+    pub warnings: Vec<String>,
+    pub(super) skin: Option<Rc<skin::Skin>>,
+    pub(super) layers: BTreeMap<usize, Rc<super::interpolate::LayerHairs>>,
+    pub(super) control: Option<Rc<pelage_groom::control::ControlHairs>>,
+    hashes: RefCell<FileHashes>,
+    options: Options,
+    last: BTreeMap<String, Recipe>,
+    ran: BTreeMap<What, Counts>,
+    progress: &'a mut Progress,
+}
+
+impl<'a> Runner<'a> {
+    /// Opens the cache of a shot and plans it.
+    pub fn new(project: &'a Project, options: Options, progress: &'a mut Progress) -> Result<Self, Error> {
+        if let Some(frames) = &options.frames {
+            let strangers: Vec<i32> = frames.iter().filter(|f| !project.frames.contains_key(f)).copied().collect();
+            if !strangers.is_empty() {
+                let [a, b] = project.shot.value.shot.frames;
+                let what = format!("frame {} is not in the shot", frame_list(&strangers));
+                return Err(Error::input(what, format!("the shot goes from {a} to {b}")));
+            }
+        }
+        let cache = project.cache_dir();
+        let store = Store::open(&cache).map_err(Error::disk(&cache))?;
+        let last = store.last(&project.shot.value.shot.name);
+        Ok(Runner {
+            project,
+            plan: Plan::new(project),
+            store,
+            warnings: Vec::new(),
+            skin: None,
+            layers: BTreeMap::new(),
+            control: None,
+            hashes: RefCell::new(FileHashes::open(&cache)),
+            options,
+            last,
+            ran: BTreeMap::new(),
+            progress,
+        })
+    }
+
+    /// Payload of a finished step; `None` if it must run.
+    pub fn fetch(&self, what: What) -> Option<Entry> {
+        let step = self.plan.step(what);
+        if self.options.force == Some(step.stage) && !self.ran.contains_key(&what) {
+            return None;
+        }
+        self.store.get(&step.recipe.key())
+    }
+
+    /// Keeps the result of a step.
+    pub fn keep(&mut self, what: What, counts: Counts, files: &[(&str, &[u8])]) -> Result<(), Error> {
+        let recipe = &self.plan.step(what).recipe;
+        self.store.put(recipe, counts.clone(), files).map_err(Error::disk(&self.project.cache_dir()))?;
+        self.ran.insert(what, counts);
+        Ok(())
+    }
+
+    /// Reads the maps that a feature names, one channel.
+    pub fn map(&self, m: &MapRef) -> Result<TiledMap, Error> {
+        skin::read_map(&self.project.maps[&m.map], m, false)
+    }
+
+    /// Content hash of an output file.
+    pub fn file_hash(&self, path: &Path) -> Option<String> {
+        self.hashes.borrow_mut().hash(path).ok()
+    }
+
+    fn is_done(&self, step: &Step) -> bool {
+        if self.options.force == Some(step.stage) {
+            return false;
+        }
+        match step.what {
+            What::Export(_) | What::Still | What::Sheet => super::export::is_written(self, step),
+            _ => self.store.contains(&step.recipe.key()),
+        }
+    }
+
+    /// Steps of a stage that this run is about.
+    fn selected(&self, stage: Stage) -> Vec<Step> {
+        let wanted = |s: &&Step| match s.what {
+            What::Frame(_, f) => self.options.frames.as_ref().is_none_or(|o| o.contains(&f)),
+            What::Sheet => self.options.sheet,
+            _ => true,
+        };
+        self.plan.steps.iter().filter(|s| s.stage == stage).filter(wanted).cloned().collect()
+    }
+
+    fn stages(&self) -> Vec<Stage> {
+        let to = self.options.to.unwrap_or(Stage::Preview);
+        Stage::ALL.into_iter().filter(|s| *s <= to && self.options.without != Some(*s)).collect()
+    }
+
+    /// Why the steps run, each reason once.
+    fn reasons(&self, steps: &[Step]) -> Vec<String> {
+        let mut out: Vec<String> = Vec::new();
+        for step in steps {
+            for reason in self.plan.reasons(step.what, &self.last) {
+                if !out.contains(&reason) {
+                    out.push(reason);
+                }
+            }
+        }
+        out
+    }
+
+    /// Frames that a whole-shot file still waits for.
+    fn waits_for(&self, step: &Step) -> Vec<i32> {
+        let absent = |w: &What| match w {
+            What::Frame(_, f) if !self.store.contains(&self.plan.step(*w).recipe.key()) => Some(*f),
+            _ => None,
+        };
+        let frames: BTreeSet<i32> = step.reads.iter().filter_map(absent).collect();
+        frames.into_iter().collect()
+    }
+
+    /// What would run, and why.
+    pub fn planned(&self) -> Vec<PlannedStage> {
+        let stage = |stage: Stage| {
+            let steps = self.selected(stage);
+            let (done, run): (Vec<Step>, Vec<Step>) = steps.into_iter().partition(|s| self.is_done(s));
+            let reasons = self.reasons(&run);
+            let run = run.into_iter().map(|s| s.name).collect();
+            PlannedStage { name: stage.name().to_owned(), run, reused: done.len(), reasons }
+        };
+        self.stages().into_iter().map(stage).collect()
+    }
+
+    /// Brings everything up to date.
+    pub fn run(&mut self) -> Result<Report, Error> {
+        let shot = self.project.shot.value.shot.name.clone();
+        let mut report = Report { shot: shot.clone(), version: env!("CARGO_PKG_VERSION").to_owned(), stages: Vec::new() };
+        let names: BTreeSet<String> = self.plan.steps.iter().map(|s| s.name.clone()).collect();
+        let mut last = self.last.clone();
+        last.retain(|name, _| names.contains(name));
+        for stage in self.stages() {
+            let stage_report = self.run_stage(stage, &mut last)?;
+            report.stages.push(stage_report);
+        }
+        if last != self.last {
+            self.store.set_last(&shot, &last).map_err(Error::disk(&self.project.cache_dir()))?;
+        }
+        self.hashes.borrow_mut().save();
+        Ok(report)
+    }
+
+    fn run_stage(&mut self, stage: Stage, last: &mut BTreeMap<String, Recipe>) -> Result<StageReport, Error> {
+        let (wall, cpu) = (Instant::now(), cpu_seconds());
+        let steps = self.selected(stage);
+        let (done, todo): (Vec<Step>, Vec<Step>) = steps.iter().cloned().partition(|s| self.is_done(s));
+        let mut report = StageReport { name: stage.name().to_owned(), ..Default::default() };
+        report.reasons = self.reasons(&todo);
+        if !todo.is_empty() {
+            self.progress.begin(stage.name(), todo.len());
+            for reason in &report.reasons {
+                self.progress.say(&format!("{:<12} because {reason}", stage.name()));
+            }
+        }
+        let mut waiting = BTreeSet::new();
+        for step in &todo {
+            let missing = if stage >= Stage::Export { self.waits_for(step) } else { Vec::new() };
+            if !missing.is_empty() {
+                self.progress.say(&format!("{} waits for frame {}", step.name, frame_list(&missing)));
+                *report.skipped.entry(format!("{} waiting for frames", step.name)).or_default() += missing.len() as u64;
+                waiting.insert(step.what);
+                continue;
+            }
+            self.progress.working(&step.name);
+            self.make(step.what)?;
+            self.progress.step();
+        }
+        for step in steps.iter().filter(|s| !waiting.contains(&s.what)) {
+            last.insert(step.name.clone(), step.recipe.clone());
+        }
+        let ran: Vec<&Step> = todo.iter().filter(|s| self.ran.contains_key(&s.what)).collect();
+        (report.ran, report.reused) = tally(stage, &ran, &done);
+        for step in &steps {
+            self.add_counts(step, &mut report.counts);
+        }
+        report.warnings = std::mem::take(&mut self.warnings);
+        report.warnings.extend(self.store.take_warnings());
+        for warning in &report.warnings {
+            self.progress.say(&format!("warning: {warning}"));
+        }
+        report.wall_s = wall.elapsed().as_secs_f64();
+        report.cpu_s = cpu_seconds() - cpu;
+        report.peak_bytes = peak_bytes();
+        if !todo.is_empty() {
+            self.progress.end(&format!("{} ran, {} reused", report.ran, report.reused));
+        }
+        Ok(report)
+    }
+
+    /// Adds the counts of a step of this or an earlier run. Frames are not summed: the largest frame counts.
+    fn add_counts(&self, step: &Step, counts: &mut Counts) {
+        let found = self.ran.get(&step.what).cloned().or_else(|| self.store.counts(&step.recipe.key()));
+        for (name, n) in found.unwrap_or_default() {
+            let at = counts.entry(name).or_default();
+            *at = match step.what {
+                What::Frame(..) | What::Rest(_) => (*at).max(n),
+                _ => *at + n,
+            };
+        }
+    }
+
+    fn make(&mut self, what: What) -> Result<(), Error> {
+        use super::{export, groom, instance, interpolate, preview};
+        match what {
+            What::Place => groom::placed(self).map(drop),
+            What::Comb => groom::combed(self).map(drop),
+            What::Candidates(i) => instance::candidates(self, i).map(drop),
+            What::Roots(i) => instance::roots(self, i).map(drop),
+            What::Weights(i) => instance::weights(self, i).map(drop),
+            What::Length(i) | What::Width(i) | What::Opacity(i) => instance::column(self, what, i).map(drop),
+            What::Color(i) => instance::color(self, i).map(drop),
+            What::Rest(_) | What::Frame(..) => interpolate::positions(self, what).map(drop),
+            What::Export(format) => export::write(self, what, format),
+            What::Still => preview::still(self),
+            What::Sheet => preview::sheet(self),
+        }
+    }
+}
+
+/// Steps as the report counts them: frames for interpolation, files for export and preview, else the stage as one.
+fn tally(stage: Stage, ran: &[&Step], done: &[Step]) -> (usize, usize) {
+    match stage {
+        Stage::Groom | Stage::Instance => (usize::from(!ran.is_empty()), usize::from(ran.is_empty())),
+        Stage::Interpolate => {
+            let frame = |s: &Step| match s.what {
+                What::Frame(_, f) => Some(f),
+                _ => None,
+            };
+            let new: BTreeSet<i32> = ran.iter().filter_map(|s| frame(s)).collect();
+            let old: BTreeSet<i32> = done.iter().filter_map(frame).filter(|f| !new.contains(f)).collect();
+            (new.len(), old.len())
+        }
+        Stage::Export | Stage::Preview => (ran.len(), done.len()),
+    }
+}
