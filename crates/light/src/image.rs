@@ -1,0 +1,195 @@
+//! Pictures in memory: tone curve, contact sheets, frame numbers, a heat map.
+
+use rayon::prelude::*;
+
+/// A picture, linear, top row first.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Image {
+    /// Pixels along a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// `height` rows of `width` pixels: linear red, green, blue with the primaries of sRGB, >= 0.
+    pub rgb: Vec<[f32; 3]>,
+}
+
+/// Where the shoulder of the tone curve begins, linear. Lower greys whole highlights, higher clips them hard.
+const SHOULDER: f32 = 0.55;
+
+impl Image {
+    /// A picture of one colour.
+    pub fn filled(width: usize, height: usize, rgb: [f32; 3]) -> Image {
+        Image { width, height, rgb: vec![rgb; width * height] }
+    }
+
+    /// `height` rows of `width` pixels of 3 bytes, as a PNG or PPM file wants them: tone curve (straight up to a
+    /// shoulder, then towards 1 without reaching it), then the transfer curve of sRGB (IEC 61966-2-1).
+    pub fn to_srgb8(&self) -> Vec<u8> {
+        let mut bytes = vec![0u8; self.rgb.len() * 3];
+        bytes.par_chunks_mut(3 * 4096).zip(self.rgb.par_chunks(4096)).for_each(|(out, rgb)| {
+            for (o, &c) in out.iter_mut().zip(rgb.iter().flatten()) {
+                *o = srgb8(tone(c));
+            }
+        });
+        bytes
+    }
+
+    /// Writes a whole number into the lower left corner: light digits of 5 x 7 dots with a dark rim, each dot `scale`
+    /// pixels wide. What does not fit is cut off.
+    pub fn draw_number(&mut self, number: i64, scale: usize) {
+        let text = number.to_string();
+        let dots: Vec<(i64, i64)> = text
+            .bytes()
+            .enumerate()
+            .flat_map(|(k, c)| {
+                let glyph = glyph(c);
+                (0..35).filter(move |d| glyph[d / 5] >> (4 - d % 5) & 1 == 1).map(move |d| (k * 6 + d % 5, d / 5))
+            })
+            .map(|(x, y)| (x as i64, y as i64))
+            .collect();
+        let s = scale.max(1) as i64;
+        let (x0, y0) = (2 * s, self.height as i64 - 9 * s);
+        for (rim, grey) in [((s + 1) / 2, 0.01), (0, 0.9)] {
+            for &(x, y) in &dots {
+                for j in y * s - rim..(y + 1) * s + rim {
+                    for i in x * s - rim..(x + 1) * s + rim {
+                        let (px, py) = (x0 + i, y0 + j);
+                        if (0..self.width as i64).contains(&px) && (0..self.height as i64).contains(&py) {
+                            self.rgb[py as usize * self.width + px as usize] = [grey; 3];
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Straight up to the shoulder, then a hyperbola of the same slope that tends to 1.
+fn tone(x: f32) -> f32 {
+    if x.is_nan() || x <= SHOULDER {
+        return x.max(0.0);
+    }
+    let u = (x - SHOULDER) / (1.0 - SHOULDER);
+    if u.is_finite() { SHOULDER + (1.0 - SHOULDER) * u / (1.0 + u) } else { 1.0 }
+}
+
+/// Transfer curve of sRGB, to 8 bits, rounded.
+fn srgb8(x: f32) -> u8 {
+    let y = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * libm::powf(x, 1.0 / 2.4) - 0.055 };
+    (y * 255.0 + 0.5).clamp(0.0, 255.0) as u8
+}
+
+/// Linear value of an 8-bit sRGB value: for colours that people write down.
+pub fn linear(srgb: u8) -> f32 {
+    let y = f32::from(srgb) / 255.0;
+    if y <= 0.040_45 { y / 12.92 } else { libm::powf((y + 0.055) / 1.055, 2.4) }
+}
+
+/// Pixels between the pictures of a contact sheet.
+const GAP: usize = 4;
+
+/// Pictures side by side, row by row, `columns` a row, on a dark ground with thin gaps. Cells are as large as the
+/// largest picture; smaller ones are centred.
+pub fn contact_sheet(images: &[Image], columns: usize) -> Image {
+    let columns = columns.clamp(1, images.len().max(1));
+    let rows = images.len().div_ceil(columns);
+    let cell = images.iter().fold([0, 0], |c, i| [c[0].max(i.width), c[1].max(i.height)]);
+    if rows == 0 || cell.contains(&0) {
+        return Image::default();
+    }
+    let mut sheet = Image::filled(columns * (cell[0] + GAP) + GAP, rows * (cell[1] + GAP) + GAP, [0.012; 3]);
+    for (k, image) in images.iter().enumerate() {
+        let x = GAP + k % columns * (cell[0] + GAP) + (cell[0] - image.width) / 2;
+        let y = GAP + k / columns * (cell[1] + GAP) + (cell[1] - image.height) / 2;
+        for j in 0..image.height {
+            let row = (y + j) * sheet.width + x;
+            sheet.rgb[row..row + image.width].copy_from_slice(&image.rgb[j * image.width..(j + 1) * image.width]);
+        }
+    }
+    sheet
+}
+
+/// Colour of a number in [0, 1], linear: from deep blue over teal and green to yellow, lightness rising evenly.
+/// Outside, the ends go on; a number that is not one is magenta.
+pub fn heat(t: f32) -> [f32; 3] {
+    const STOP: [[u8; 3]; 6] =
+        [[48, 18, 92], [52, 72, 146], [30, 124, 148], [44, 170, 118], [142, 208, 74], [250, 232, 60]];
+    if t.is_nan() {
+        return [1.0, 0.0, 1.0];
+    }
+    let x = t.clamp(0.0, 1.0) * (STOP.len() - 1) as f32;
+    let k = (x as usize).min(STOP.len() - 2);
+    let f = x - k as f32;
+    std::array::from_fn(|i| {
+        let (a, b) = (linear(STOP[k][i]), linear(STOP[k + 1][i]));
+        a + (b - a) * f
+    })
+}
+
+/// 5 x 7 dots of a digit or a minus sign, a row a byte, the leftmost dot in bit 4.
+fn glyph(c: u8) -> [u8; 7] {
+    match c {
+        b'0' => [0x0e, 0x11, 0x13, 0x15, 0x19, 0x11, 0x0e],
+        b'1' => [0x04, 0x0c, 0x04, 0x04, 0x04, 0x04, 0x0e],
+        b'2' => [0x0e, 0x11, 0x01, 0x06, 0x08, 0x10, 0x1f],
+        b'3' => [0x0e, 0x11, 0x01, 0x06, 0x01, 0x11, 0x0e],
+        b'4' => [0x02, 0x06, 0x0a, 0x12, 0x1f, 0x02, 0x02],
+        b'5' => [0x1f, 0x10, 0x1e, 0x01, 0x01, 0x11, 0x0e],
+        b'6' => [0x06, 0x08, 0x10, 0x1e, 0x11, 0x11, 0x0e],
+        b'7' => [0x1f, 0x01, 0x02, 0x04, 0x08, 0x08, 0x08],
+        b'8' => [0x0e, 0x11, 0x11, 0x0e, 0x11, 0x11, 0x0e],
+        b'9' => [0x0e, 0x11, 0x11, 0x0f, 0x01, 0x02, 0x0c],
+        _ => [0, 0, 0, 0x0e, 0, 0, 0],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eight_bit_values_survive_below_the_shoulder() {
+        for v in 0..=190u8 {
+            assert_eq!(srgb8(tone(linear(v))), v);
+        }
+        let rising: Vec<u8> = (0..100).map(|i| srgb8(tone(i as f32 * 0.05))).collect();
+        assert!(rising.windows(2).all(|w| w[0] <= w[1]) && rising[99] > 245);
+        assert_eq!([srgb8(tone(f32::INFINITY)), srgb8(tone(-1.0)), srgb8(tone(f32::NAN))], [255, 0, 0]);
+    }
+
+    #[test]
+    fn a_contact_sheet_keeps_every_pixel() {
+        let images: Vec<Image> = (1..=5).map(|k| Image::filled(10 + k % 2, 6, [k as f32, 0.0, 0.0])).collect();
+        let sheet = contact_sheet(&images, 3);
+        assert_eq!((sheet.width, sheet.height), (3 * 15 + 4, 2 * 10 + 4));
+        for (k, image) in images.iter().enumerate() {
+            let n = sheet.rgb.iter().filter(|c| c[0] == (k + 1) as f32).count();
+            assert_eq!(n, image.rgb.len());
+        }
+        assert_eq!(contact_sheet(&[], 4), Image::default());
+        assert_eq!(contact_sheet(&[Image::default()], 0), Image::default());
+    }
+
+    #[test]
+    fn numbers_are_drawn_inside_the_picture_only() {
+        let mut image = Image::filled(60, 30, [0.3; 3]);
+        image.draw_number(-1007, 2);
+        let light = image.rgb.iter().filter(|c| c[0] == 0.9).count();
+        // Dots of '-', '1', '0', '0', '7' at 2 x 2 pixels each.
+        let dots: u32 = b"-1007".iter().flat_map(|&c| glyph(c)).map(u8::count_ones).sum();
+        assert_eq!(light as u32, dots * 4);
+        Image::filled(3, 2, [0.0; 3]).draw_number(i64::MIN, 9);
+        Image::default().draw_number(1, 1);
+    }
+
+    #[test]
+    fn heat_gets_lighter_all_the_way() {
+        let light = |t: f32| {
+            let c = heat(t);
+            0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]
+        };
+        assert!((0..100).all(|i| light(i as f32 * 0.01) < light((i + 1) as f32 * 0.01)));
+        assert_eq!(heat(-3.0), heat(0.0));
+        assert_eq!(heat(f32::NAN), [1.0, 0.0, 1.0]);
+    }
+}

@@ -1,0 +1,410 @@
+//! The preview: skin and hairs of a scene to a picture on the CPU.
+//!
+//! Hairs are drawn as antialiased lines in the order of their depth and blended (opacity shadow maps paper §3). The
+//! paper sorts into bins and draws far to near; here the picture is cut into tiles, each with an exact order, drawn
+//! near to far, so that covered pixels cost nothing and tiles are independent of each other.
+
+use crate::hair::{Chunk, Draw, Scratch, Tiling};
+use crate::raster::{Facet, Filter, Point, TILE, Tile};
+use crate::shade::{HairModel, LightDir, fade, to_light};
+use crate::slab::{HUGE, Slabs};
+use crate::{Camera, HairShade, Image, Light, V3, View};
+use pelage_geom::{Offsets, Vec3};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// A skin to draw.
+#[derive(Clone, Copy, Debug)]
+pub struct SkinView<'a> {
+    /// Vertices, scene units.
+    pub position: &'a [[f64; 3]],
+    /// Triangles as vertex indices; both sides are drawn.
+    pub triangle: &'a [[u32; 3]],
+    /// Smooth unit normals, one a vertex; empty for flat facets.
+    pub normal: &'a [[f32; 3]],
+    /// Linear colour.
+    pub color: [f32; 3],
+}
+
+/// A layer of hairs to draw. Columns may be empty where a default is named; missing ends of columns count as default.
+#[derive(Clone, Copy, Debug)]
+pub struct HairView<'a> {
+    /// Runs of points, one a strand.
+    pub offsets: &'a Offsets,
+    /// Points, scene units relative to `origin`; root first.
+    pub position: &'a [[f32; 3]],
+    /// Scene-space point that positions are relative to.
+    pub origin: [f64; 3],
+    /// Diameter, scene units, one a point (default 0: not seen).
+    pub width: &'a [f32],
+    /// Linear colour, one a strand (default a middle brown).
+    pub color: &'a [[f32; 3]],
+    /// Opacity of a hair's whole width, one a strand, in [0, 1] (default 1).
+    pub opacity: &'a [f32],
+    /// Unit normal of the skin at the root, one a strand (default none: shading by the hair's direction alone).
+    pub root_normal: &'a [[f32; 3]],
+}
+
+/// What is drawn, and in what light.
+#[derive(Clone, Copy, Debug)]
+pub struct Scene<'a> {
+    /// Skin: hides hair, takes light and shadow.
+    pub skin: Option<SkinView<'a>>,
+    /// Layers of hair, drawn as one.
+    pub layers: &'a [HairView<'a>],
+    /// Lights; [`crate::studio_lights`] makes three.
+    pub lights: &'a [Light],
+    /// Linear colour behind everything.
+    pub background: [f32; 3],
+}
+
+/// How it is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Shading of hairs.
+    pub hair: HairShade,
+    /// Linear colour of the light from all around.
+    pub ambient: [f32; 3],
+    /// Factor of the optical depth of hair in the shadow cue; 0 for none, 1 for what the widths say.
+    pub shadow: f32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings { hair: HairShade::default(), ambient: [0.17, 0.18, 0.20], shadow: 0.55 }
+    }
+}
+
+/// What was drawn and what could not be.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RenderCounts {
+    /// Strands of all layers.
+    pub hairs: usize,
+    /// Lines drawn for them: only what is in the picture.
+    pub pieces: usize,
+    /// Points of strands left out because they are not finite; the hair is cut there.
+    pub bad_points: usize,
+    /// Triangles left out because a corner is missing or not finite.
+    pub bad_triangles: usize,
+}
+
+/// Part of the light that a white hair passes on to those behind it. Light hair scatters forward: at 0 blond hair gets
+/// black shadows, at 1 white fur gets none.
+const SCATTER: f32 = 0.75;
+
+/// Part of the ambient light that reaches a place into which no light shines.
+const DEEP: f32 = 0.22;
+
+/// Linear colour of hair without a colour.
+const BROWN: [f32; 3] = [0.16, 0.085, 0.042];
+
+/// Strands per chunk of work.
+const CHUNK: usize = 256;
+
+/// A point of a layer in scene space.
+pub(crate) fn in_layer(layer: &HairView, p: &[f32; 3]) -> Vec3 {
+    Vec3::new(layer.origin[0] + f64::from(p[0]), layer.origin[1] + f64::from(p[1]), layer.origin[2] + f64::from(p[2]))
+}
+
+impl HairView<'_> {
+    /// Diameter at point `i`, >= 0.
+    pub(crate) fn width(&self, i: usize) -> f32 {
+        self.width.get(i).copied().filter(|w| *w > 0.0 && *w < 1e15).unwrap_or(0.0)
+    }
+
+    pub(crate) fn color(&self, s: usize) -> V3 {
+        V3::from(self.color.get(s).copied().unwrap_or(BROWN)).map(|c| c.clamp(0.0, 1.0)).map(not_nan)
+    }
+
+    pub(crate) fn opacity(&self, s: usize) -> f32 {
+        not_nan(self.opacity.get(s).copied().unwrap_or(1.0).clamp(0.0, 1.0))
+    }
+
+    pub(crate) fn root_normal(&self, s: usize) -> Option<Vec3> {
+        let n = Vec3::from(self.root_normal.get(s)?.map(f64::from));
+        (n.norm_squared() > 0.25 && n.norm_squared() < 4.0).then(|| n.normalize())
+    }
+}
+
+impl SkinView<'_> {
+    /// Corners of a triangle, if they exist and are finite.
+    pub(crate) fn corners(&self, triangle: &[u32; 3]) -> Option<[Vec3; 3]> {
+        let mut corner = [Vec3::zeros(); 3];
+        for (c, &v) in corner.iter_mut().zip(triangle) {
+            *c = Vec3::from(*self.position.get(v as usize)?);
+        }
+        corner.iter().all(|c| c.iter().all(|v| v.abs() < HUGE)).then_some(corner)
+    }
+}
+
+fn not_nan(x: f32) -> f32 {
+    if x.is_nan() { 0.0 } else { x }
+}
+
+/// Lights in camera space with their shadow cues.
+pub(crate) struct Lighting {
+    lights: Vec<LightDir>,
+    slabs: Vec<Slabs>,
+    model: HairModel,
+    settings: Settings,
+    /// Unit, camera space.
+    up: V3,
+    parallel: bool,
+}
+
+impl Lighting {
+    fn new(scene: &Scene, camera: &Camera, view: &View, settings: &Settings) -> Lighting {
+        let toward: Vec<Vec3> = scene.lights.iter().map(to_light).collect();
+        let lights = toward.iter().zip(scene.lights);
+        let up = to_light(&Light { direction: camera.up.map(|v| -v), color: [0.0; 3] });
+        Lighting {
+            lights: lights
+                .map(|(t, l)| LightDir { to_light: view.turn(*t).cast(), color: V3::from(l.color) })
+                .collect(),
+            slabs: toward.par_iter().map(|t| Slabs::new(scene, *t, view)).collect(),
+            model: HairModel::new(settings.hair),
+            settings: *settings,
+            up: view.turn(up).cast(),
+            parallel: view.parallel,
+        }
+    }
+
+    /// Numbers that [`Lighting::depths`] gives for a point.
+    pub fn columns(&self) -> usize {
+        2 * self.lights.len()
+    }
+
+    /// Appends per light: optical depth of hair towards it, and the part of it that the skin lets through.
+    pub fn depths(&self, p: V3, out: &mut Vec<f32>) {
+        for s in &self.slabs {
+            out.push(self.settings.shadow * s.hair_depth(p));
+            out.push(s.skin_light(p));
+        }
+    }
+
+    fn eye(&self, p: V3) -> V3 {
+        if self.parallel { -V3::z() } else { -p / p.norm().max(f32::MIN_POSITIVE) }
+    }
+
+    /// Part of the ambient light that arrives where `depth` is as from [`Lighting::depths`].
+    fn ambient(&self, depth: &[f32]) -> f32 {
+        let open: f32 = depth.chunks_exact(2).map(|d| fade(d[0]) * (0.5 + 0.5 * d[1])).sum();
+        DEEP + (1.0 - DEEP) * if depth.is_empty() { 1.0 } else { open / self.lights.len() as f32 }
+    }
+
+    /// Colour of a hair at a point of camera space with unit `tangent`.
+    pub fn hair(&self, p: V3, tangent: V3, color: V3, normal: Option<V3>, depth: &[f32]) -> V3 {
+        let eye = self.eye(p);
+        let ambient = V3::from(self.settings.ambient).component_mul(&color) * self.ambient(depth);
+        let mut sum = ambient;
+        for (light, d) in self.lights.iter().zip(depth.chunks_exact(2)) {
+            let through = color.map(|c| fade(d[0] * (1.0 - SCATTER * c)) * d[1]);
+            let sent = self.model.reflect(tangent, eye, light.to_light, normal, color);
+            sum += sent.component_mul(&light.color).component_mul(&through);
+        }
+        sum
+    }
+
+    /// Colour of the skin at a point of camera space; `normal` is unit and may point away from the eye.
+    fn skin(&self, p: V3, normal: V3, color: V3) -> V3 {
+        let n = if normal.dot(&self.eye(p)) < 0.0 { -normal } else { normal };
+        let mut depth = Vec::with_capacity(self.columns());
+        self.depths(p, &mut depth);
+        let mut sum = V3::from(self.settings.ambient) * (self.ambient(&depth) * (0.75 + 0.25 * n.dot(&self.up)));
+        for (light, d) in self.lights.iter().zip(depth.chunks_exact(2)) {
+            sum += light.color * (n.dot(&light.to_light).max(0.0) * fade(d[0]) * d[1]);
+        }
+        sum.component_mul(&color)
+    }
+}
+
+/// Draws a scene. The same bytes for any number of threads. Bad input is passed over and counted, never an error; a
+/// picture without pixels is an empty image.
+pub fn render(
+    scene: &Scene,
+    camera: &Camera,
+    width: usize,
+    height: usize,
+    settings: &Settings,
+) -> (Image, RenderCounts) {
+    let mut counts = RenderCounts { hairs: scene.layers.iter().map(|l| l.offsets.len()).sum(), ..Default::default() };
+    if width == 0 || height == 0 {
+        return (Image { width, height, rgb: Vec::new() }, counts);
+    }
+    let view = camera.view(width, height);
+    let tiling = Tiling::new(width, height);
+    let lighting = Lighting::new(scene, camera, &view, settings);
+    let (facets, facet_bins) = facets(scene, &view, &tiling, &mut counts);
+    let draw = Draw { view: &view, lighting: &lighting, tiling };
+    let (points, opacity, mut lines) = lines(scene, &draw, &mut counts);
+    let filter = Filter::new();
+    let tiles = tiling.across * tiling.down;
+    let mut rest = lines.1.as_mut_slice();
+    let mut jobs = Vec::with_capacity(tiles);
+    for t in 0..tiles {
+        let (own, after) = std::mem::take(&mut rest).split_at_mut(lines.0[t + 1] - lines.0[t]);
+        jobs.push(own);
+        rest = after;
+    }
+    let drawn: Vec<Vec<[f32; 3]>> = jobs
+        .into_par_iter()
+        .enumerate()
+        .map(|(t, order)| {
+            let (x, y) = (t % tiling.across * TILE, t / tiling.across * TILE);
+            let mut tile = Tile::new(x, y, TILE.min(width - x), TILE.min(height - y));
+            for &f in &facet_bins.1[facet_bins.0[t]..facet_bins.0[t + 1]] {
+                tile.facet(&facets[f as usize], !view.parallel);
+            }
+            order.sort_unstable();
+            for &key in order.iter() {
+                let i = key as u32 as usize;
+                let (a, b) = (&points[i], &points[i + 1]);
+                let size = 1.0 / view.scale(f64::from(a.z.min(b.z))) as f32;
+                tile.line(a, b, opacity[a.strand as usize], size, &filter);
+            }
+            tile.resolve(scene.background, |triangle, at, depth| {
+                skin_color(scene, &view, &lighting, triangle, at, depth)
+            })
+        })
+        .collect();
+    (assemble(&drawn, &tiling), counts)
+}
+
+/// Puts tiles together.
+fn assemble(drawn: &[Vec<[f32; 3]>], tiling: &Tiling) -> Image {
+    let mut image = Image::filled(tiling.width, tiling.height, [0.0; 3]);
+    image.rgb.par_chunks_mut(tiling.width).enumerate().for_each(|(y, row)| {
+        for (i, part) in row.chunks_mut(TILE).enumerate() {
+            let start = y % TILE * part.len();
+            part.copy_from_slice(&drawn[y / TILE * tiling.across + i][start..start + part.len()]);
+        }
+    });
+    image
+}
+
+/// For each tile a range of the second list, which holds what falls into the tiles, in the order of `pairs`.
+fn bin<T: Copy + Default>(tiles: usize, pairs: impl Iterator<Item = (u32, T)> + Clone) -> (Vec<usize>, Vec<T>) {
+    let mut start = vec![0usize; tiles + 1];
+    for (t, _) in pairs.clone() {
+        start[t as usize + 1] += 1;
+    }
+    for t in 0..tiles {
+        start[t + 1] += start[t];
+    }
+    let mut list = vec![T::default(); start[tiles]];
+    let mut next = start.clone();
+    for (t, v) in pairs {
+        list[next[t as usize]] = v;
+        next[t as usize] += 1;
+    }
+    (start, list)
+}
+
+/// Points of all hairs in the picture, opacity per strand, and for each tile the keys of its pieces: depth in the upper
+/// half, first point in the lower. Keys are distinct, so sorting them gives one order only.
+#[allow(clippy::type_complexity, reason = "three lists that are used once")]
+fn lines(scene: &Scene, draw: &Draw, counts: &mut RenderCounts) -> (Vec<Point>, Vec<f32>, (Vec<usize>, Vec<u64>)) {
+    let mut jobs: Vec<(&HairView, Range<usize>, usize)> = Vec::new();
+    let mut opacity = Vec::with_capacity(counts.hairs);
+    for layer in scene.layers {
+        let (n, first) = (layer.offsets.len(), opacity.len());
+        jobs.extend((0..n).step_by(CHUNK).map(|s| (layer, s..(s + CHUNK).min(n), first)));
+        opacity.extend((0..n).map(|s| layer.opacity(s)));
+    }
+    let work = |(layer, strands, first): &(&HairView, Range<usize>, usize)| {
+        let (mut chunk, mut scratch) = (Chunk::default(), Scratch::default());
+        for s in strands.clone() {
+            draw.strand(layer, s, (first + s) as u32, &mut scratch, &mut chunk);
+        }
+        chunk
+    };
+    let chunks: Vec<Chunk> = jobs.par_iter().map(work).collect();
+    let mut points = Vec::with_capacity(chunks.iter().map(|c| c.points.len()).sum());
+    let mut starts = Vec::with_capacity(chunks.len());
+    for c in &chunks {
+        starts.push(points.len() as u32);
+        points.extend_from_slice(&c.points);
+        counts.pieces += c.pieces;
+        counts.bad_points += c.bad_points;
+    }
+    let keys = chunks.iter().zip(&starts).flat_map(|(c, &start)| {
+        c.bins.iter().map(move |&(tile, i)| {
+            let z = 0.5 * (c.points[i as usize].z + c.points[i as usize + 1].z);
+            (tile, u64::from(z.to_bits()) << 32 | u64::from(start + i))
+        })
+    });
+    let bins = bin(draw.tiling.across * draw.tiling.down, keys);
+    (points, opacity, bins)
+}
+
+/// Triangles in the picture, cut at the near plane, and for each tile the list of those that touch it.
+fn facets(
+    scene: &Scene,
+    view: &View,
+    tiling: &Tiling,
+    counts: &mut RenderCounts,
+) -> (Vec<Facet>, (Vec<usize>, Vec<u32>)) {
+    let mut facets = Vec::new();
+    let mut pairs = Vec::new();
+    for (t, corner) in scene.skin.iter().flat_map(|s| s.triangle.iter().map(|t| s.corners(t)).enumerate()) {
+        let Some(corner) = corner else {
+            counts.bad_triangles += 1;
+            continue;
+        };
+        let polygon = clip_near(corner.map(|p| view.to_camera(p)), view.near);
+        let polygon: Vec<[f64; 3]> = polygon
+            .iter()
+            .map(|c| [view.centre[0] + c.x * view.scale(c.z), view.centre[1] + c.y * view.scale(c.z), c.z])
+            .collect();
+        for k in 2..polygon.len() {
+            let corner = [polygon[0], polygon[k - 1], polygon[k]];
+            let low = std::array::from_fn(|i| corner.iter().fold(f64::INFINITY, |m, c| m.min(c[i])) as f32 - 1.0);
+            let high = std::array::from_fn(|i| corner.iter().fold(f64::NEG_INFINITY, |m, c| m.max(c[i])) as f32 + 1.0);
+            let index = facets.len() as u32;
+            facets.push(Facet { corner, triangle: t as u32 });
+            tiling.touched(low, high, |tile| pairs.push((tile, index)));
+        }
+    }
+    let bins = bin(tiling.across * tiling.down, pairs.iter().copied());
+    (facets, bins)
+}
+
+/// The part of a triangle of camera space beyond the near plane: 0, 3 or 4 corners.
+fn clip_near(corner: [Vec3; 3], near: f64) -> Vec<Vec3> {
+    let mut out = Vec::with_capacity(4);
+    for i in 0..3 {
+        let (a, b) = (corner[i], corner[(i + 1) % 3]);
+        if a.z >= near {
+            out.push(a);
+        }
+        if (a.z >= near) != (b.z >= near) {
+            out.push(a + (b - a) * ((near - a.z) / (b.z - a.z)));
+        }
+    }
+    out
+}
+
+/// Colour of the skin where the ray through pixel position `at` meets `triangle` at `depth`.
+fn skin_color(scene: &Scene, view: &View, lighting: &Lighting, triangle: u32, at: [f64; 2], depth: f32) -> V3 {
+    let Some(skin) = &scene.skin else { return V3::zeros() };
+    let vertex = skin.triangle[triangle as usize];
+    let Some(corner) = skin.corners(&vertex) else { return V3::zeros() };
+    let c = corner.map(|p| view.to_camera(p));
+    let per = 1.0 / view.scale(f64::from(depth));
+    let p = Vec3::new((at[0] - view.centre[0]) * per, (at[1] - view.centre[1]) * per, f64::from(depth));
+    let face = (c[1] - c[0]).cross(&(c[2] - c[0]));
+    let area = face.norm_squared();
+    if area <= 0.0 || !area.is_finite() {
+        return V3::zeros();
+    }
+    let weight = |i: usize| (c[(i + 1) % 3] - p).cross(&(c[(i + 2) % 3] - p)).dot(&face) / area;
+    let mut normal = Vec3::zeros();
+    for i in 0..3 {
+        if let Some(n) = skin.normal.get(vertex[i] as usize) {
+            normal += view.turn(Vec3::from(n.map(f64::from))) * weight(i).clamp(0.0, 1.0);
+        }
+    }
+    let size = normal.norm();
+    let normal = if size > 1e-9 && size.is_finite() { normal / size } else { face / area.sqrt() };
+    lighting.skin(p.cast(), normal.cast(), V3::from(skin.color))
+}

@@ -1,0 +1,236 @@
+//! How much light a hair and the skin send to the eye.
+
+use crate::{Camera, V3};
+use pelage_geom::Vec3;
+
+/// A light far away.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Light {
+    /// The way the light travels, towards the scene, in scene space; any length but zero.
+    pub direction: [f64; 3],
+    /// Linear colour times strength: 1 on a surface at right angles to the light shows its own colour.
+    pub color: [f32; 3],
+}
+
+/// Key from above left, fill from the right, rim from behind: three lights that move with the camera.
+pub fn studio_lights(camera: &Camera) -> Vec<Light> {
+    let axis = camera.view(1, 1).axis;
+    let light =
+        |x: f64, y: f64, z: f64, color| Light { direction: (axis[0] * x + axis[1] * y + axis[2] * z).into(), color };
+    vec![
+        light(0.55, 0.75, 0.75, [1.75, 1.62, 1.45]),
+        light(-0.8, 0.1, 0.75, [0.34, 0.40, 0.50]),
+        light(-0.55, 0.75, -0.8, [1.15, 1.22, 1.35]),
+    ]
+}
+
+/// Shading of a hair: Kajiya and Kay's model (opacity shadow maps paper §5) with two highlights instead of one, and
+/// Goldman's factor for light from the front and from behind.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HairShade {
+    /// Factor of the diffuse part, which has the hair's colour.
+    pub diffuse: f32,
+    /// Factor of the first highlight, which has the light's colour.
+    pub specular: f32,
+    /// Its exponent: 20 is dull, 150 is polished.
+    pub exponent: f32,
+    /// Degrees by which it moves towards the root: the slope of the scales, about 7 on human hair.
+    pub shift_deg: f32,
+    /// Factor of the second highlight, which has the hair's colour.
+    pub glint: f32,
+    /// Its exponent: lower than the first.
+    pub glint_exponent: f32,
+    /// Degrees by which it moves towards the tip.
+    pub glint_shift_deg: f32,
+    /// Light that comes through from behind, relative to light sent back to the front (Goldman 1997, "Fake fur
+    /// rendering", the ratio of its transmission and reflection factors).
+    pub through: f32,
+    /// How much a hair that stands up takes the shading of the skin at its root, in [0, 1]: the production pipeline's
+    /// mixed normal (§4.1), which gives short fur the form of the body. Only with root normals.
+    pub skin_normal: f32,
+}
+
+impl Default for HairShade {
+    fn default() -> Self {
+        HairShade {
+            diffuse: 0.62,
+            specular: 0.16,
+            exponent: 55.0,
+            shift_deg: 7.0,
+            glint: 0.55,
+            glint_exponent: 14.0,
+            glint_shift_deg: 9.0,
+            through: 0.6,
+            skin_normal: 0.5,
+        }
+    }
+}
+
+/// A light as the shading wants it: camera space.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LightDir {
+    /// Unit, towards the light.
+    pub to_light: V3,
+    /// Linear colour times strength.
+    pub color: V3,
+}
+
+/// Constants of [`HairShade`], worked out once.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct HairModel {
+    shade: HairShade,
+    first: Lobe,
+    second: Lobe,
+}
+
+/// One highlight.
+#[derive(Clone, Copy, Debug)]
+struct Lobe {
+    cos: f32,
+    sin: f32,
+    exponent: f32,
+    /// Below this the highlight is less than [`FAINT`], and taken as 0.
+    cutoff: f32,
+}
+
+/// A highlight under this part of its peak is not computed: invisible in 8 bits.
+const FAINT: f32 = 1e-4;
+
+impl Lobe {
+    fn new(shift_deg: f32, exponent: f32) -> Lobe {
+        let a = f64::from(shift_deg).to_radians();
+        let exponent = exponent.clamp(1.0, 1e4);
+        Lobe { cos: libm::cos(a) as f32, sin: libm::sin(a) as f32, exponent, cutoff: libm::powf(FAINT, 1.0 / exponent) }
+    }
+
+    /// The highlight for -cos(a + b) and sin(a + b), a and b the angles of light and eye with the hair.
+    fn value(&self, cos: f32, sin: f32) -> f32 {
+        let c = cos * self.cos + sin * self.sin;
+        if c <= self.cutoff { 0.0 } else { libm::powf(c.min(1.0), self.exponent) - FAINT }
+    }
+}
+
+impl HairModel {
+    pub fn new(shade: HairShade) -> HairModel {
+        HairModel {
+            shade,
+            first: Lobe::new(shade.shift_deg, shade.exponent),
+            second: Lobe::new(-shade.glint_shift_deg, shade.glint_exponent),
+        }
+    }
+
+    /// Light sent to the eye by one light of strength 1, before shadows: `tangent` unit from root to tip, `eye` and
+    /// `light` unit and away from the hair, `normal` that of the skin at the root. With T, L, V for those:
+    /// diffuse sin(T, L), highlight max(0, sin(T, L) sin(T, V) - (T.L)(T.V))^p, whose base is -cos of the sum of both
+    /// angles, so that a shift of the highlight is a shift of that sum.
+    pub fn reflect(&self, tangent: V3, eye: V3, light: V3, normal: Option<V3>, color: V3) -> V3 {
+        let s = &self.shade;
+        let (tl, tv) = (tangent.dot(&light), tangent.dot(&eye));
+        let (sl, sv) = ((1.0 - tl * tl).max(0.0).sqrt(), (1.0 - tv * tv).max(0.0).sqrt());
+        // Light and eye on the same side of the hair (1) or on opposite sides (-1), seen along the hair.
+        let side = if sl * sv > 1e-4 { ((light.dot(&eye) - tl * tv) / (sl * sv)).clamp(-1.0, 1.0) } else { 0.0 };
+        let front = 0.5 + 0.5 * side;
+        let lit = front + (1.0 - front) * s.through;
+        let mut diffuse = sl * lit;
+        if let Some(n) = normal {
+            let m = s.skin_normal * tangent.dot(&n).abs().min(1.0);
+            diffuse += (n.dot(&light).max(0.0) - diffuse) * m;
+        }
+        let (cos, sin) = (sl * sv - tl * tv, sl * tv + tl * sv);
+        let first = s.specular * front * self.first.value(cos, sin);
+        let second = s.glint * lit * self.second.value(cos, sin);
+        color * (s.diffuse * diffuse + second) + V3::repeat(first)
+    }
+}
+
+/// exp(-x) for x >= 0 by a rational function without a platform's exp: within 0.6 % of 1, falling all the way.
+pub(crate) fn fade(x: f32) -> f32 {
+    1.0 / (1.0 + x * (1.0 + x * (0.5 + x * (1.0 / 6.0 + x * (1.0 / 24.0 + x * (1.0 / 120.0))))))
+}
+
+/// Unit vector towards a light; straight up for a light without direction.
+pub(crate) fn to_light(light: &Light) -> Vec3 {
+    let d = Vec3::from(light.direction);
+    let big = d.amax();
+    if big > 0.0 && big.is_finite() { -(d / big).normalize() } else { Vec3::y() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plain(exponent: f32) -> HairModel {
+        HairModel::new(HairShade {
+            diffuse: 0.0,
+            specular: 1.0,
+            exponent,
+            shift_deg: 0.0,
+            glint: 0.0,
+            glint_exponent: 1.0,
+            glint_shift_deg: 0.0,
+            through: 1.0,
+            skin_normal: 0.0,
+        })
+    }
+
+    #[test]
+    fn the_highlight_peaks_on_the_mirror_cone() {
+        let model = plain(60.0);
+        let tangent = V3::x();
+        let light = V3::new(0.6, 0.8, 0.0);
+        let (mut best, mut at) = (0.0, 0.0f64);
+        for k in 0..=1800 {
+            let a = f64::from(k) * 0.1_f64.to_radians();
+            let eye = V3::new(libm::cos(a) as f32, libm::sin(a) as f32, 0.0);
+            let v = model.reflect(tangent, eye, light, None, V3::zeros()).x;
+            if v > best {
+                (best, at) = (v, a);
+            }
+        }
+        assert!((libm::cos(at) + 0.6).abs() < 2e-3, "peak at {}", at.to_degrees());
+        assert!((best - 1.0).abs() < 2e-3, "{best}");
+    }
+
+    #[test]
+    fn a_shift_moves_the_peak_towards_the_root() {
+        // Hair bending from tangent angle 50 (towards the eye at its root) to 130 degrees; light and eye along +x.
+        let peak = |shift: f32| {
+            let mut model = plain(80.0);
+            model.first = Lobe::new(shift, 80.0);
+            let value = |a: f64| {
+                let t = V3::new(libm::cos(a.to_radians()) as f32, libm::sin(a.to_radians()) as f32, 0.0);
+                model.reflect(t, V3::x(), V3::x(), None, V3::zeros()).x
+            };
+            (500..=1300).map(|k| f64::from(k) * 0.1).fold(50.0, |b, a| if value(a) > value(b) { a } else { b })
+        };
+        assert!((peak(0.0) - 90.0).abs() < 0.2);
+        assert!((peak(8.0) - 86.0).abs() < 0.2);
+        assert!((peak(-8.0) - 94.0).abs() < 0.2);
+    }
+
+    #[test]
+    fn shading_is_finite_and_not_negative_for_any_directions() {
+        let model = HairModel::new(HairShade::default());
+        let dirs = [V3::x(), -V3::x(), V3::y(), V3::z(), -V3::z(), V3::new(0.6, 0.0, 0.8)];
+        for t in dirs {
+            for e in dirs {
+                for l in dirs {
+                    for n in [None, Some(V3::z()), Some(-V3::z())] {
+                        let c = model.reflect(t, e, l, n, V3::new(0.3, 0.2, 0.1));
+                        assert!(c.iter().all(|v| v.is_finite() && *v >= 0.0), "{t} {e} {l}: {c}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn fade_is_close_to_the_exponential() {
+        for k in 0..2000 {
+            let x = k as f32 * 0.01;
+            assert!((fade(x) - libm::expf(-x)).abs() < 0.006, "{x}");
+            assert!(fade(x + 0.01) < fade(x));
+        }
+        assert_eq!(fade(f32::INFINITY), 0.0);
+    }
+}

@@ -1,0 +1,245 @@
+//! A cue for shadows: how much hair lies between a point and a light, from a coarse grid of slabs across the light.
+//!
+//! This is the idea of opacity shadow maps (paper §4) at one low resolution, without their accuracy: enough to read
+//! volume in a preview, not enough to export.
+
+use crate::preview::{Scene, in_layer};
+use crate::{V3, View};
+use pelage_geom::Vec3;
+use rayon::prelude::*;
+
+/// Cells along each axis of the grid. Fewer lose the parting and the locks; twice as many cost eight times the memory
+/// and begin to show single hairs as noise.
+const CELLS: usize = 128;
+
+/// Texels along each axis of the skin's depth map.
+const TEXELS: usize = 512;
+
+/// Cells that a point is lifted towards the light before it is looked up, so that hair does not shadow itself and the
+/// outermost layer stays lit. At 0 everything is dull, over 2 thin fur casts no shadow.
+const LIFT: f32 = 0.75;
+
+/// Texels by which skin must be nearer to the light to shadow a point, and over which that shadow sets in.
+const SKIN_BIAS: f32 = 2.5;
+
+/// Parts that are summed apart and then together in this order: the same sum for any number of threads.
+const PARTS: usize = 4;
+
+/// Light-aligned box cut into cells: coordinates in cells from a low corner.
+#[derive(Clone, Copy, Debug)]
+struct Box3 {
+    axis: [Vec3; 3],
+    low: [f64; 3],
+    per_unit: [f64; 3],
+}
+
+impl Box3 {
+    /// Bounds of points along `axis`, cut into `cells` each way; `None` without a finite point.
+    fn around(axis: [Vec3; 3], cells: usize, points: impl Iterator<Item = Vec3>) -> Option<Box3> {
+        let (mut lo, mut hi) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for p in points {
+            let c = axis.map(|a| a.dot(&p));
+            if c.iter().all(|v| v.abs() < HUGE) {
+                for i in 0..3 {
+                    lo[i] = lo[i].min(c[i]);
+                    hi[i] = hi[i].max(c[i]);
+                }
+            }
+        }
+        let largest = (0..3).map(|i| hi[i] - lo[i]).fold(f64::NEG_INFINITY, f64::max);
+        if largest < 0.0 {
+            return None;
+        }
+        // A flat box would have cells of no size, and so shadows without bound.
+        let least = if largest > 0.0 { largest / 16.0 } else { 1.0 };
+        let size: [f64; 3] = std::array::from_fn(|i| (hi[i] - lo[i]).max(least) * 1.001);
+        let low = std::array::from_fn(|i| 0.5 * (lo[i] + hi[i] - size[i]));
+        Some(Box3 { axis, low, per_unit: size.map(|s| cells as f64 / s) })
+    }
+
+    fn place(&self, p: Vec3) -> [f64; 3] {
+        std::array::from_fn(|i| (self.axis[i].dot(&p) - self.low[i]) * self.per_unit[i])
+    }
+
+    /// The same coordinates from camera space.
+    fn from_camera(&self, view: &View) -> Affine {
+        let origin = self.place(view.eye);
+        Affine(std::array::from_fn(|i| {
+            let a = view.turn(self.axis[i]) * self.per_unit[i];
+            [a.x as f32, a.y as f32, a.z as f32, origin[i] as f32]
+        }))
+    }
+}
+
+/// Coordinates beyond this count as not finite: their squares still fit single precision.
+pub(crate) const HUGE: f64 = 1e18;
+
+/// Camera space to cells.
+#[derive(Clone, Copy, Debug)]
+struct Affine([[f32; 4]; 3]);
+
+impl Affine {
+    #[inline]
+    fn apply(&self, p: V3) -> [f32; 3] {
+        self.0.map(|r| r[0] * p.x + r[1] * p.y + r[2] * p.z + r[3])
+    }
+}
+
+/// What one light sees: optical depth of hair in a grid, and depth of skin in a map.
+pub(crate) struct Slabs {
+    /// Camera space to the hair's cells, and per column `CELLS + 1` sums of optical depth down from the light.
+    hair: Option<(Affine, Vec<f32>)>,
+    /// Camera space to the skin's texels, and the depth of the skin nearest to the light, in texels.
+    skin: Option<(Affine, Vec<f32>)>,
+}
+
+impl Slabs {
+    /// Looks at a scene along a light that lies in the direction `to_light` (unit).
+    pub fn new(scene: &Scene, to_light: Vec3, view: &View) -> Slabs {
+        let z = -to_light;
+        let x = if z.x.abs() < 0.6 { Vec3::x() } else { Vec3::y() };
+        let x = (x - z * z.dot(&x)).normalize();
+        let axis = [x, z.cross(&x), z];
+        let points = scene.layers.iter().flat_map(|l| l.position.iter().map(|p| in_layer(l, p)));
+        let hair = Box3::around(axis, CELLS, points).map(|b| (b.from_camera(view), hair_grid(scene, &b)));
+        let skin = scene.skin.as_ref().and_then(|s| {
+            let b = Box3::around(axis, TEXELS, s.position.iter().map(|&p| Vec3::from(p)))?;
+            Some((b.from_camera(view), skin_map(s, &b)))
+        });
+        Slabs { hair, skin }
+    }
+
+    /// Optical depth of the hair between a point of camera space and the light.
+    pub fn hair_depth(&self, p: V3) -> f32 {
+        let Some((affine, sum)) = &self.hair else { return 0.0 };
+        let [x, y, z] = affine.apply(p);
+        let n = CELLS as f32;
+        if !(x > -0.5 && y > -0.5 && x < n + 0.5 && y < n + 0.5 && z.is_finite()) {
+            return 0.0;
+        }
+        let z = (z - LIFT).clamp(0.0, n - 1e-3);
+        let (k, fz) = (z as usize, z - z.floor());
+        let (x, y) = ((x - 0.5).clamp(0.0, n - 1.001), (y - 0.5).clamp(0.0, n - 1.001));
+        let (i, j, fx, fy) = (x as usize, y as usize, x - x.floor(), y - y.floor());
+        let at = |i: usize, j: usize| {
+            let c = (j * CELLS + i) * (CELLS + 1) + k;
+            sum[c] + (sum[c + 1] - sum[c]) * fz
+        };
+        let low = at(i, j) * (1.0 - fx) + at(i + 1, j) * fx;
+        let high = at(i, j + 1) * (1.0 - fx) + at(i + 1, j + 1) * fx;
+        low * (1.0 - fy) + high * fy
+    }
+
+    /// Part of the light that no skin is in the way of, in [0, 1].
+    pub fn skin_light(&self, p: V3) -> f32 {
+        let Some((affine, depth)) = &self.skin else { return 1.0 };
+        let [x, y, z] = affine.apply(p);
+        let n = TEXELS as f32;
+        if !(x > 0.0 && y > 0.0 && x < n && y < n) {
+            return 1.0;
+        }
+        let (x, y) = ((x - 0.5).clamp(0.0, n - 1.001), (y - 0.5).clamp(0.0, n - 1.001));
+        let (i, j, fx, fy) = (x as usize, y as usize, x - x.floor(), y - y.floor());
+        let lit = |i: usize, j: usize| 1.0 - ((z - depth[j * TEXELS + i]) / SKIN_BIAS - 1.0).clamp(0.0, 1.0);
+        let low = lit(i, j) * (1.0 - fx) + lit(i + 1, j) * fx;
+        let high = lit(i, j + 1) * (1.0 - fx) + lit(i + 1, j + 1) * fx;
+        low * (1.0 - fy) + high * fy
+    }
+}
+
+/// Optical depth (opacity times covered part of a cell's cross-section) of all hairs, summed down each column.
+fn hair_grid(scene: &Scene, cells: &Box3) -> Vec<f32> {
+    let part = |k: usize| {
+        let mut grid = vec![0.0f32; CELLS * CELLS * CELLS];
+        for layer in scene.layers {
+            let n = layer.offsets.len();
+            for s in n * k / PARTS..n * (k + 1) / PARTS {
+                splat(layer, s, cells, &mut grid);
+            }
+        }
+        grid
+    };
+    let parts: Vec<Vec<f32>> = (0..PARTS).into_par_iter().map(part).collect();
+    let mut sum = vec![0.0f32; CELLS * CELLS * (CELLS + 1)];
+    sum.par_chunks_mut(CELLS + 1).enumerate().for_each(|(c, column)| {
+        for k in 0..CELLS {
+            let cell = parts.iter().fold(0.0, |a, p| a + p[c * CELLS + k]);
+            column[k + 1] = column[k] + cell;
+        }
+    });
+    drop(parts);
+    blur(&blur(&sum, 1), CELLS)
+}
+
+/// Adds one strand to the grid: its true projected area, spread along it at less than a cell's distance.
+fn splat(layer: &crate::HairView, s: usize, cells: &Box3, grid: &mut [f32]) {
+    let range = layer.offsets.range(s);
+    let opacity = layer.opacity(s);
+    let per_area = cells.per_unit[0] * cells.per_unit[1];
+    for i in range.start + 1..range.end.min(layer.position.len()) {
+        let [a, b] = [i - 1, i].map(|i| cells.place(in_layer(layer, &layer.position[i])));
+        let d: [f64; 3] = std::array::from_fn(|c| b[c] - a[c]);
+        let long = d.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        if !long.is_finite() {
+            continue;
+        }
+        // Length seen from the light, scene units.
+        let (u, v) = (d[0] / cells.per_unit[0], d[1] / cells.per_unit[1]);
+        let width = f64::from(0.5 * (layer.width(i - 1) + layer.width(i)));
+        let steps = ((long * 1.2) as usize + 1).min(4 * CELLS);
+        let each = ((u * u + v * v).sqrt() * width * per_area) as f32 * opacity / steps as f32;
+        for k in 0..steps {
+            let f = (k as f64 + 0.5) / steps as f64;
+            let c: [f64; 3] = std::array::from_fn(|i| a[i] + d[i] * f);
+            if c.iter().all(|v| *v >= 0.0 && *v < CELLS as f64) {
+                grid[(c[1] as usize * CELLS + c[0] as usize) * CELLS + c[2] as usize] += each;
+            }
+        }
+    }
+}
+
+/// Weights 1/4, 1/2, 1/4 over columns `stride` apart within rows of [`CELLS`] (stride 1) or over rows; borders repeat.
+fn blur(sum: &[f32], stride: usize) -> Vec<f32> {
+    let n = CELLS + 1;
+    let mut out = vec![0.0f32; sum.len()];
+    out.par_chunks_mut(n).enumerate().for_each(|(c, column)| {
+        let at = c / stride % CELLS;
+        let low = if at > 0 { c - stride } else { c };
+        let high = if at + 1 < CELLS { c + stride } else { c };
+        for (k, v) in column.iter_mut().enumerate() {
+            *v = 0.25 * (sum[low * n + k] + sum[high * n + k]) + 0.5 * sum[c * n + k];
+        }
+    });
+    out
+}
+
+/// Depth of the skin nearest to the light at texel centres, in texels; infinite where there is none.
+fn skin_map(skin: &crate::SkinView, texels: &Box3) -> Vec<f32> {
+    let mut depth = vec![f32::INFINITY; TEXELS * TEXELS];
+    for t in skin.triangle {
+        let Some(corner) = skin.corners(t) else { continue };
+        let c = corner.map(|p| texels.place(p));
+        let cross =
+            |a: [f64; 3], b: [f64; 3], p: [f64; 2]| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
+        let area = cross(c[0], c[1], [c[2][0], c[2][1]]);
+        if area == 0.0 || !area.is_finite() {
+            continue;
+        }
+        let span = |i: usize| {
+            let lo = (c[0][i].min(c[1][i]).min(c[2][i]) - 0.5).ceil().max(0.0);
+            let hi = (c[0][i].max(c[1][i]).max(c[2][i]) - 0.5).floor().min(TEXELS as f64 - 1.0);
+            lo as usize..(hi + 1.0).max(lo) as usize
+        };
+        for j in span(1) {
+            for i in span(0) {
+                let p = [i as f64 + 0.5, j as f64 + 0.5];
+                let w = [cross(c[1], c[2], p) / area, cross(c[2], c[0], p) / area, cross(c[0], c[1], p) / area];
+                if w.iter().all(|&w| w >= -1e-9) {
+                    let d = &mut depth[j * TEXELS + i];
+                    *d = d.min((w[0] * c[0][2] + w[1] * c[1][2] + w[2] * c[2][2]) as f32);
+                }
+            }
+        }
+    }
+    depth
+}
