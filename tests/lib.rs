@@ -1,1 +1,212 @@
-//! End-to-end, golden, determinism, cache and command-line tests.
+//! Small shots made in a temporary folder, and the command to run over them.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// A shot folder that goes away with this value.
+pub struct ShotFolder {
+    folder: tempfile::TempDir,
+    command: PathBuf,
+}
+
+impl ShotFolder {
+    /// An empty folder; `command` is the `pelage` binary.
+    pub fn new(command: &str) -> Self {
+        ShotFolder { folder: tempfile::tempdir().expect("a temporary folder"), command: command.into() }
+    }
+
+    /// Path of the folder.
+    pub fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Writes a file, making folders on the way.
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+        let path = self.path().join(name);
+        std::fs::create_dir_all(path.parent().expect("inside the folder")).expect("a folder");
+        std::fs::write(path, content).expect("a file");
+    }
+
+    /// Content of a file.
+    pub fn read(&self, name: &str) -> Vec<u8> {
+        std::fs::read(self.path().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+    }
+
+    /// Replaces text in a file; the text must be there.
+    pub fn edit(&self, name: &str, from: &str, to: &str) {
+        let text = String::from_utf8(self.read(name)).expect("text");
+        assert!(text.contains(from), "{name} has no `{from}`");
+        self.write(name, text.replacen(from, to, 1));
+    }
+
+    /// The command in this folder, not yet started.
+    pub fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(&self.command);
+        command.args(arguments).current_dir(self.path()).stdin(std::process::Stdio::null());
+        command
+    }
+
+    /// Runs the command.
+    pub fn pelage(&self, arguments: &[&str]) -> Output {
+        self.command(arguments).output().expect("the command starts")
+    }
+
+    /// Runs the command, which must succeed, and returns stdout.
+    pub fn succeed(&self, arguments: &[&str]) -> String {
+        let out = self.pelage(arguments);
+        let err = String::from_utf8_lossy(&out.stderr);
+        assert!(out.status.success(), "pelage {arguments:?} failed:\n{err}");
+        String::from_utf8(out.stdout).expect("text on stdout")
+    }
+
+    /// Runs with `--json --quiet` and returns the report.
+    pub fn report(&self, arguments: &[&str]) -> serde_json::Value {
+        let text = self.succeed(&[&["run", "--json", "--quiet"], arguments].concat());
+        serde_json::from_str(&text).expect("a report")
+    }
+}
+
+/// An ASCII PLY of a mesh, written independently of the code under test: one vertex per (position, uv) pair.
+pub fn ascii_ply(mesh: &pelage_geom::Mesh) -> String {
+    let mut vertices: Vec<String> = Vec::new();
+    let mut index = std::collections::BTreeMap::new();
+    let mut faces = String::new();
+    for (t, triangle) in mesh.triangle.iter().enumerate() {
+        let corners: Vec<String> = (0..3)
+            .map(|k| {
+                let (p, uv) = (mesh.position[triangle[k] as usize], mesh.corner_uv[t][k]);
+                let line = format!("{} {} {} {} {}", p[0], p[1], p[2], uv[0], uv[1]);
+                let n = *index.entry((triangle[k], line.clone())).or_insert_with(|| {
+                    vertices.push(line);
+                    vertices.len() - 1
+                });
+                n.to_string()
+            })
+            .collect();
+        faces.push_str(&format!("3 {}\n", corners.join(" ")));
+    }
+    let properties = ["x", "y", "z", "s", "t"].map(|p| format!("property double {p}\n")).concat();
+    format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\n{properties}element face {}\nproperty list uchar int vertex_indices\nend_header\n{}\n{faces}",
+        vertices.len(),
+        mesh.triangle.len(),
+        vertices.join("\n"),
+    )
+}
+
+/// A greyscale 8-bit PNG, rows from the top.
+pub fn grey_png(width: u32, height: u32, value: impl Fn(u32, u32) -> u8) -> Vec<u8> {
+    let mut raw = Vec::new();
+    for y in 0..height {
+        raw.push(0);
+        raw.extend((0..width).map(|x| value(x, y)));
+    }
+    let mut out = b"\x89PNG\r\n\x1a\n".to_vec();
+    let mut header = Vec::new();
+    header.extend(width.to_be_bytes());
+    header.extend(height.to_be_bytes());
+    header.extend([8, 0, 0, 0, 0]);
+    chunk(&mut out, b"IHDR", &header);
+    chunk(&mut out, b"IDAT", &stored_zlib(&raw));
+    chunk(&mut out, b"IEND", &[]);
+    out
+}
+
+fn chunk(out: &mut Vec<u8>, name: &[u8; 4], data: &[u8]) {
+    out.extend((data.len() as u32).to_be_bytes());
+    let body = [name.as_slice(), data].concat();
+    out.extend(&body);
+    let mut crc = !0u32;
+    for byte in body {
+        crc ^= u32::from(byte);
+        for _ in 0..8 {
+            crc = if crc & 1 == 1 { (crc >> 1) ^ 0xedb8_8320 } else { crc >> 1 };
+        }
+    }
+    out.extend((!crc).to_be_bytes());
+}
+
+/// A zlib stream of stored blocks.
+fn stored_zlib(data: &[u8]) -> Vec<u8> {
+    let mut out = vec![0x78, 0x01];
+    let blocks: Vec<&[u8]> = data.chunks(65_535).collect();
+    for (i, block) in blocks.iter().enumerate() {
+        let n = block.len() as u16;
+        out.push(u8::from(i + 1 == blocks.len()));
+        out.extend(n.to_le_bytes());
+        out.extend((!n).to_le_bytes());
+        out.extend(*block);
+    }
+    let (mut a, mut b) = (1u32, 0u32);
+    for byte in data {
+        a = (a + u32::from(*byte)) % 65_521;
+        b = (b + a) % 65_521;
+    }
+    out.extend(((b << 16) | a).to_be_bytes());
+    out
+}
+
+/// A small two-layer shot on a ball of radius 5 cm with six charts, moved rigidly over `frames` frames.
+pub fn small_shot(command: &str, frames: u32) -> ShotFolder {
+    let shot = ShotFolder::new(command);
+    shot.write("grooms/ball.ply", ascii_ply(&pelage_geom::shapes::cube_sphere(8, 5.0)));
+    let mut csv = String::from("time_s,tx,ty,tz,qx,qy,qz,qw\n");
+    for f in 0..=frames {
+        let (t, angle) = (f64::from(f) / 24.0, 0.05 * f64::from(f));
+        csv.push_str(&format!("{t},{},0,0,0,{},0,{}\n", 0.001 * f64::from(f), (0.5 * angle).sin(), (0.5 * angle).cos()));
+    }
+    shot.write("grooms/ball.csv", csv);
+    shot.write("maps/half.png", grey_png(64, 64, |x, _| if x < 32 { 255 } else { 96 }));
+    shot.write("maps/length.png", grey_png(32, 32, |_, y| 128 + 3 * y as u8));
+    shot.write(
+        "pipeline.toml",
+        format!(
+            r#"[shot]
+name = "ball"
+frames = [1, {frames}]
+fps = 24
+meters_per_unit = 0.01
+
+[skin]
+rest = "grooms/ball.ply"
+motion = "grooms/ball.csv"
+
+[groom]
+file = "grooms/ball.toml"
+
+[export]
+formats = ["usd", "mcap"]
+
+[preview]
+size = [160, 120]
+sheet = 2
+"#
+        ),
+    );
+    shot.write(
+        "grooms/ball.toml",
+        r#"[control]
+placement = { per_cm2 = 0.2 }
+points = 6
+
+[[comb]]
+kind = "direction-curve"
+points = [[0.0, 10.0, 0.0], [0.0, -10.0, 0.0]]
+bend = 0.6
+curvature = 0.5
+
+[[layer]]
+name = "under"
+density = { value = 4.0, map = "../maps/half.png" }
+length = { value = 1.0, noise = 0.2 }
+width = { value = 40.0, tip = 0.5 }
+
+[[layer]]
+name = "over"
+density = { value = 1.0 }
+length = { value = 2.5, map = "../maps/length.png" }
+color = { value = [0.4, 0.2, 0.1] }
+"#,
+    );
+    shot
+}
