@@ -1,1 +1,239 @@
-//! TODO
+//! The `.hair` format of C. Yuksel (cyHairFile): a 128-byte header and flat little-endian arrays. It states neither
+//! units nor an up axis; his own models are z-up.
+
+use super::FormatError;
+use super::ply::{Curves, read_bytes, write_whole};
+use pelage_geom::{Offsets, Strands};
+use std::io::Write;
+use std::path::Path;
+
+const HEADER: usize = 128;
+const SEGMENTS: u32 = 1;
+const POINTS: u32 = 2;
+const THICKNESS: u32 = 4;
+const TRANSPARENCY: u32 = 8;
+const COLORS: u32 = 16;
+
+/// Reads a `.hair` file. Thickness is taken as a diameter; a default thickness other than 1 (which writers leave in
+/// when they mean nothing) stands for all points. Transparency and colours are passed over. The header's text becomes
+/// the one comment.
+pub fn read_hair(path: &Path) -> Result<Curves, FormatError> {
+    parse_hair(path, &read_bytes(path)?)
+}
+
+fn parse_hair(path: &Path, bytes: &[u8]) -> Result<Curves, FormatError> {
+    let wrong = |what: String| FormatError::new(path, what);
+    if bytes.len() < HEADER || !bytes.starts_with(b"HAIR") {
+        let what = "not a .hair file: it does not start with 'HAIR' and a header of 128 bytes";
+        return Err(wrong(what.to_owned()));
+    }
+    let word = |at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
+    let (hairs, points, arrays, d_segments) = (word(4) as usize, word(8) as usize, word(12), word(16) as usize);
+    let d_thickness = f32::from_bits(word(20));
+    if hairs == 0 {
+        return Err(wrong("holds no hairs".to_owned()));
+    }
+    if arrays & POINTS == 0 {
+        return Err(wrong("holds no points (bit 1 of its arrays is not set)".to_owned()));
+    }
+    let has = |bit: u32, bytes: usize| if arrays & bit != 0 { bytes as u64 } else { 0 };
+    let sizes = [
+        has(SEGMENTS, 2 * hairs),
+        12 * points as u64,
+        has(THICKNESS, 4 * points),
+        has(TRANSPARENCY, 4 * points),
+        has(COLORS, 12 * points),
+    ];
+    let expected = HEADER as u64 + sizes.iter().sum::<u64>();
+    if expected > bytes.len() as u64 {
+        let what =
+            format!("{hairs} hairs with {points} points need {expected} bytes, but the file has {}", bytes.len());
+        return Err(wrong(what).hint("the file was cut short or its header is wrong; export or copy it again"));
+    }
+    let start = |k: usize| HEADER + sizes[..k].iter().sum::<u64>() as usize;
+    let segments: Vec<usize> = match arrays & SEGMENTS {
+        0 if (hairs as u64) * (d_segments as u64 + 1) != points as u64 => {
+            return Err(wrong(format!("{hairs} hairs of {} points do not give {points} points", d_segments + 1)));
+        }
+        0 => vec![d_segments; hairs],
+        _ => bytes[start(0)..start(1)].chunks_exact(2).map(|b| usize::from(u16::from_le_bytes([b[0], b[1]]))).collect(),
+    };
+    let total = segments.iter().map(|s| s + 1).sum::<usize>();
+    if total != points {
+        return Err(wrong(format!("its hairs have {total} points in all, its header says {points}")));
+    }
+    let mut warnings = Vec::new();
+    if expected < bytes.len() as u64 {
+        warnings.push(format!("{} bytes after the last array were ignored", bytes.len() as u64 - expected));
+    }
+    let floats = |from: usize, n: usize| {
+        bytes[from..from + 4 * n].chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+    };
+    let position: Vec<[f32; 3]> =
+        floats(start(1), 3 * points).collect::<Vec<_>>().chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
+    let thickness: Option<Vec<f32>> = match arrays & THICKNESS {
+        0 if d_thickness.is_finite() && d_thickness > 0.0 && d_thickness != 1.0 => Some(vec![d_thickness; points]),
+        0 => None,
+        _ => Some(floats(start(2), points).collect()),
+    };
+    let finite =
+        |p: usize| position[p].iter().all(|x| x.is_finite()) && thickness.as_ref().is_none_or(|t| t[p].is_finite());
+    let info = String::from_utf8_lossy(&bytes[40..HEADER]).trim_end_matches('\0').trim().to_owned();
+    let mut out = Curves { width: thickness.as_ref().map(|_| Vec::new()), warnings, ..Curves::default() };
+    out.comments.extend((!info.is_empty()).then_some(info));
+    let (mut first, mut counts) = (0, Vec::with_capacity(hairs));
+    for (h, s) in segments.iter().enumerate() {
+        let range = first..first + s + 1;
+        first = range.end;
+        if let Some(p) = range.clone().find(|p| !finite(*p)) {
+            let what = "position or thickness is not a finite number".to_owned();
+            return Err(wrong(what).at(format!("hair {h}, point {}", p - range.start)));
+        }
+        if *s > 0 {
+            counts.push(s + 1);
+            out.strands.position.extend_from_slice(&position[range.clone()]);
+            if let (Some(w), Some(t)) = (&mut out.width, &thickness) {
+                w.extend_from_slice(&t[range]);
+            }
+        }
+    }
+    if counts.len() < hairs {
+        out.warnings.push(format!("{} hairs without a segment were skipped", hairs - counts.len()));
+    }
+    if counts.is_empty() {
+        return Err(wrong("no hair has a segment".to_owned()));
+    }
+    out.strands.offsets = Offsets::from_counts(counts);
+    Ok(out)
+}
+
+/// Writes curves as a `.hair` file, with diameters as thickness if given. `info` (units, for one) is cut to 88 bytes.
+/// Positions are written with the origin added. A hair has 2 to 65,536 points.
+pub fn write_hair_file(path: &Path, strands: &Strands, width: Option<&[f32]>, info: &str) -> Result<(), FormatError> {
+    let bytes = encode(strands, width, info).map_err(|what| FormatError::new(path, what))?;
+    write_whole(path, |out| out.write_all(&bytes))
+}
+
+fn encode(strands: &Strands, width: Option<&[f32]>, info: &str) -> Result<Vec<u8>, String> {
+    let points = strands.position.len();
+    if strands.offsets.total() != points || width.is_some_and(|w| w.len() != points) {
+        return Err(format!("{points} positions do not fit the offsets or the widths"));
+    }
+    let uniform = strands.offsets.uniform_count();
+    let mut arrays = POINTS;
+    arrays |= if uniform.is_none() { SEGMENTS } else { 0 };
+    arrays |= if width.is_some() { THICKNESS } else { 0 };
+    let mut out = Vec::with_capacity(HEADER + 16 * points);
+    out.extend_from_slice(b"HAIR");
+    let segments = uniform.map_or(0, |n| n.saturating_sub(1) as u32);
+    for v in [strands.len() as u32, points as u32, arrays, segments] {
+        out.extend_from_slice(&v.to_le_bytes());
+    }
+    for v in [1.0f32, 0.0, 1.0, 1.0, 1.0] {
+        out.extend_from_slice(&v.to_le_bytes());
+    }
+    let text = info.as_bytes();
+    out.extend_from_slice(&text[..text.len().min(HEADER - out.len())]);
+    out.resize(HEADER, 0);
+    for (s, n) in strands.offsets.counts().enumerate() {
+        let Some(segments) = n.checked_sub(1).filter(|s| *s > 0).and_then(|s| u16::try_from(s).ok()) else {
+            return Err(format!("hair {s} has {n} points; the format holds 2 to 65536"));
+        };
+        if uniform.is_none() {
+            out.extend_from_slice(&segments.to_le_bytes());
+        }
+    }
+    for p in &strands.position {
+        for (x, o) in p.iter().zip(strands.origin) {
+            out.extend_from_slice(&((f64::from(*x) + o) as f32).to_le_bytes());
+        }
+    }
+    for w in width.unwrap_or_default() {
+        out.extend_from_slice(&w.to_le_bytes());
+    }
+    Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn strands(counts: &[usize]) -> Strands {
+        let n: usize = counts.iter().sum();
+        Strands {
+            offsets: Offsets::from_counts(counts.iter().copied()),
+            position: (0..n).map(|i| [i as f32, 0.5, -1.0]).collect(),
+            ..Strands::default()
+        }
+    }
+
+    fn parse(bytes: &[u8]) -> Result<Curves, FormatError> {
+        parse_hair(Path::new("t.hair"), bytes)
+    }
+
+    fn error(bytes: &[u8]) -> String {
+        parse(bytes).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        for counts in [&[4, 4, 4][..], &[2, 5, 3]] {
+            let s = strands(counts);
+            let back = parse(&encode(&s, None, "units: cm").unwrap()).unwrap();
+            assert_eq!(back, Curves { strands: s.clone(), comments: vec!["units: cm".into()], ..Curves::default() });
+            let w: Vec<f32> = (0..s.position.len()).map(|i| 0.01 * i as f32).collect();
+            assert_eq!(parse(&encode(&s, Some(&w), "").unwrap()).unwrap().width, Some(w));
+        }
+        let mut far = strands(&[2]);
+        far.origin = [100.0, 0.0, 0.0];
+        assert_eq!(parse(&encode(&far, None, "").unwrap()).unwrap().strands.position[0], [100.0, 0.5, -1.0]);
+    }
+
+    #[test]
+    fn colours_and_defaults_are_placed_right() {
+        let mut bytes = encode(&strands(&[2, 2]), None, "").unwrap();
+        bytes[12] |= (TRANSPARENCY | COLORS) as u8;
+        bytes[20..24].copy_from_slice(&0.25f32.to_le_bytes());
+        bytes.extend([0; 4 * 4 + 4 * 12]);
+        let c = parse(&bytes).unwrap();
+        assert_eq!((c.width, c.warnings.len()), (Some(vec![0.25; 4]), 0));
+    }
+
+    #[test]
+    fn hairs_without_a_segment_are_skipped_and_counted() {
+        let mut bytes = encode(&strands(&[2, 3, 2]), None, "").unwrap();
+        bytes[HEADER..HEADER + 6].copy_from_slice(&[2, 0, 0, 0, 3, 0]);
+        let c = parse(&bytes).unwrap();
+        assert_eq!(c.strands.offsets, Offsets::from_counts([3, 4]));
+        assert_eq!(c.strands.position[3][0], 3.0 + 1.0);
+        assert!(c.warnings[0].contains("1 hairs"), "{:?}", c.warnings);
+    }
+
+    #[test]
+    fn broken_files_are_named() {
+        let good = encode(&strands(&[2, 3]), None, "").unwrap();
+        let with = |at: usize, v: [u8; 4]| {
+            let mut b = good.clone();
+            b[at..at + 4].copy_from_slice(&v);
+            b
+        };
+        assert!(error(&good[..good.len() - 1]).contains("need 192 bytes, but the file has 191"));
+        assert!(error(&good[..60]).contains("header of 128"));
+        assert!(error(b"ply\n").contains("not a .hair"));
+        assert!(error(&with(4, [255; 4])).contains("need"));
+        assert!(error(&with(8, [255; 4])).contains("need"));
+        assert!(error(&with(4, [0; 4])).contains("no hairs"));
+        assert!(error(&with(12, [1, 0, 0, 0])).contains("no points"));
+        assert!(error(&with(12, [2, 0, 0, 0])).contains("do not give 5"));
+        assert!(error(&with(HEADER, [1, 0, 9, 0])).contains("12 points in all"));
+        let e = error(&with(HEADER + 4 + 12 * 3 + 4, f32::NAN.to_le_bytes()));
+        assert!(e.contains("hair 1, point 1"), "{e}");
+        assert_eq!(parse(&[good, vec![1, 2]].concat()).unwrap().warnings.len(), 1);
+    }
+
+    #[test]
+    fn what_the_format_cannot_hold_is_refused() {
+        assert!(encode(&strands(&[1, 3]), None, "").unwrap_err().contains("hair 0"));
+        assert!(encode(&strands(&[2]), Some(&[1.0]), "").is_err());
+    }
+}
