@@ -1,5 +1,7 @@
 //! File formats, each a module that reads or writes plain data.
 
+mod bytes;
+mod check;
 pub mod csv;
 pub mod hair;
 pub mod image;

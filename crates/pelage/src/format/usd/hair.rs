@@ -1,0 +1,485 @@
+//! Hair of a shot as one binary USD file, and the check of what was written.
+
+use super::curves::{UsdCurves, read_curves};
+use super::read::{CrateFile, Node as FileNode};
+use super::write::{CrateWriter, Element, Node};
+use super::{Rep, Type};
+use crate::format::check::{Bounds, ShotCheck, write_error};
+use crate::format::{FormatError, HairFrame, HairLayer, ShotFacts};
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+
+type Result<T> = std::result::Result<T, FormatError>;
+
+/// Name of the prim that holds the layers.
+const ROOT: &str = "Hair";
+
+/// A shot being written. Frames stream to the disk as they come; what is kept is a few numbers a frame.
+///
+/// The file has an Xform "Hair" (moved to the origin of the shot) with one `BasisCurves` prim for each layer: cubic,
+/// catmullRom, pinned, so that every curve starts at its first point and ends at its last. `points`, `velocities` (per
+/// second) and `extent` are sampled at exactly the frames of the shot. `widths` are diameters, one a point. Uniform
+/// (one a curve): `st` and `surface_uv_coordinate` (texture coordinates of the root), `hairId`, `displayColor`,
+/// `displayOpacity`, and with a skin `skinprim`, `skinprimuv`. One a point: `rest`. Constant: `layer`, `pelage` (the
+/// facts of the shot, also in the `customLayerData` of the file).
+pub struct UsdHair {
+    path: PathBuf,
+    check: ShotCheck,
+    out: CrateWriter<File>,
+    frames: Vec<i32>,
+    layers: Vec<LayerOut>,
+}
+
+/// Where the samples of one layer went.
+struct LayerOut {
+    points: Node,
+    velocities: Node,
+    extent: Node,
+    /// Half the largest width: how far the hair reaches beyond its points.
+    pad: f32,
+    samples: [Vec<Rep>; 3],
+}
+
+impl UsdHair {
+    /// Starts `path` and writes what does not change over the shot.
+    pub fn create(path: &Path, facts: &ShotFacts, layers: &[HairLayer]) -> Result<Self> {
+        let check = ShotCheck::new(path, facts, layers)?;
+        let start = || -> io::Result<_> {
+            let mut out = CrateWriter::new(File::create(path)?)?;
+            let root = write_stage(&mut out, facts)?;
+            let summary = facts_text(facts);
+            let names = identifiers(layers.iter().map(|l| l.name.as_str()));
+            let layers = layers.iter().zip(&names).map(|(l, name)| write_layer(&mut out, root, l, name, &summary));
+            let layers = layers.collect::<io::Result<_>>()?;
+            Ok((out, layers))
+        };
+        let (out, layers) = start().map_err(|e| write_error(path, &e))?;
+        Ok(UsdHair { path: path.to_path_buf(), check, out, frames: facts.frames.clone(), layers })
+    }
+
+    /// Writes the next frame, with one entry for each layer.
+    pub fn write_frame(&mut self, frame: i32, layers: &[HairFrame]) -> Result<()> {
+        let bounds = self.check.frame(frame, layers)?;
+        for ((layer, data), bounds) in self.layers.iter_mut().zip(layers).zip(bounds) {
+            let extent = bounds.padded(layer.pad);
+            let mut write = || -> io::Result<()> {
+                layer.samples[0].push(self.out.array(data.position)?);
+                layer.samples[1].push(self.out.array(data.velocity)?);
+                layer.samples[2].push(self.out.array(&extent)?);
+                Ok(())
+            };
+            write().map_err(|e| write_error(&self.path, &e))?;
+        }
+        Ok(())
+    }
+
+    /// Completes the file, which cannot be opened before. An error if a frame of the shot is missing.
+    pub fn finish(self) -> Result<()> {
+        self.check.finish()?;
+        let UsdHair { path, mut out, frames, layers, .. } = self;
+        let finish = || -> io::Result<()> {
+            let times: Vec<f64> = frames.iter().map(|&f| f64::from(f)).collect();
+            let times = out.times(&times)?;
+            for layer in layers {
+                let nodes = [layer.points, layer.velocities, layer.extent];
+                for (node, samples) in nodes.into_iter().zip(&layer.samples) {
+                    let samples = out.time_samples(times, samples)?;
+                    out.field(node, "timeSamples", samples);
+                }
+            }
+            out.finish().map(drop)
+        };
+        finish().map_err(|e| write_error(&path, &e))
+    }
+}
+
+/// The facts of the shot and the prim above the layers.
+fn write_stage(out: &mut CrateWriter<File>, facts: &ShotFacts) -> io::Result<Node> {
+    let root = out.root();
+    let [first, last] = [facts.frames.first(), facts.frames.last()].map(|f| f64::from(f.copied().unwrap_or(0)));
+    let token = out.token(ROOT);
+    out.field(root, "defaultPrim", token);
+    let token = out.token(if facts.up == 'Z' { "Z" } else { "Y" });
+    out.field(root, "upAxis", token);
+    for (name, value) in [
+        ("metersPerUnit", facts.meters_per_unit),
+        ("timeCodesPerSecond", facts.fps),
+        ("framesPerSecond", facts.fps),
+        ("startTimeCode", first),
+        ("endTimeCode", last),
+    ] {
+        let value = out.double(value)?;
+        out.field(root, name, value);
+    }
+    let entries: Vec<(String, Rep)> = facts_list(facts).map(|(k, v)| (k.to_owned(), out.string(v))).collect();
+    let inner = out.dictionary(&entries)?;
+    let data = out.dictionary(&[("pelage".to_owned(), inner)])?;
+    out.field(root, "customLayerData", data);
+
+    let prim = out.prim(root, ROOT, "Xform");
+    let kind = out.token("component");
+    out.field(prim, "kind", kind);
+    if facts.origin != [0.0; 3] {
+        let node = out.attribute(prim, "xformOp:translate", "double3");
+        let value = out.double3(facts.origin)?;
+        out.field(node, "default", value);
+        let order = out.token_array(&["xformOp:translate"])?;
+        out.uniform(prim, "xformOpOrder", "token[]", order);
+    }
+    Ok(prim)
+}
+
+/// What a reader of the file may want to know beyond what USD has a place for.
+fn facts_list(facts: &ShotFacts) -> impl Iterator<Item = (&str, &str)> {
+    let own = [
+        ("shot", facts.name.as_str()),
+        ("widths", "diameters, scene units"),
+        ("velocities", "scene units per second"),
+        ("curves", "through their points, root first"),
+    ];
+    own.into_iter().chain(facts.extra.iter().map(|(k, v)| (k.as_str(), v.as_str())))
+}
+
+fn facts_text(facts: &ShotFacts) -> String {
+    facts_list(facts).map(|(k, v)| format!("{k}={v}")).collect::<Vec<_>>().join("\n")
+}
+
+/// Names that USD allows for prims: ASCII letters, digits and underscores, no digit first, all different.
+fn identifiers<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let mut out: Vec<String> = vec![];
+    for name in names {
+        let mut id: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+        if !id.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') {
+            id.insert(0, '_');
+        }
+        let base = id.clone();
+        let mut n = 2;
+        while out.contains(&id) {
+            id = format!("{base}_{n}");
+            n += 1;
+        }
+        out.push(id);
+    }
+    out
+}
+
+fn write_layer(
+    out: &mut CrateWriter<File>,
+    root: Node,
+    layer: &HairLayer,
+    name: &str,
+    facts: &str,
+) -> io::Result<LayerOut> {
+    let prim = out.prim(root, name, "BasisCurves");
+    let display = out.string(&layer.name);
+    out.field(prim, "displayName", display);
+    for (name, value) in [("type", "cubic"), ("basis", "catmullRom"), ("wrap", "pinned")] {
+        let value = out.token(value);
+        out.uniform(prim, name, "token", value);
+    }
+    let counts: Vec<i32> = layer.offsets.counts().map(|n| n as i32).collect();
+    let node = out.attribute(prim, "curveVertexCounts", "int[]");
+    let value = out.array(&counts)?;
+    out.field(node, "default", value);
+    let points = out.attribute(prim, "points", "point3f[]");
+    let velocities = out.attribute(prim, "velocities", "vector3f[]");
+    let extent = out.attribute(prim, "extent", "float3[]");
+
+    let mut column = Columns { out, prim };
+    column.write("widths", "float[]", "vertex", &layer.width)?;
+    column.write("primvars:rest", "point3f[]", "vertex", &layer.rest)?;
+    column.write("primvars:st", "texCoord2f[]", "uniform", &layer.root_uv)?;
+    column.write("primvars:surface_uv_coordinate", "float2[]", "uniform", &layer.root_uv)?;
+    column.write("primvars:hairId", "int64[]", "uniform", bytemuck::cast_slice::<u64, i64>(&layer.id))?;
+    column.write("primvars:displayColor", "color3f[]", "uniform", &layer.color)?;
+    column.write("primvars:displayOpacity", "float[]", "uniform", &layer.opacity)?;
+    if !layer.skin_face.is_empty() {
+        column.write("primvars:skinprim", "int[]", "uniform", &layer.skin_face)?;
+        column.write("primvars:skinprimuv", "texCoord2f[]", "uniform", &layer.skin_bary)?;
+    }
+    column.text("primvars:layer", &layer.name);
+    column.text("primvars:pelage", facts);
+    let pad = layer.width.iter().copied().fold(0.0, f32::max) / 2.0;
+    Ok(LayerOut { points, velocities, extent, pad, samples: [vec![], vec![], vec![]] })
+}
+
+/// Writes attributes of one prim that have an interpolation.
+struct Columns<'a> {
+    out: &'a mut CrateWriter<File>,
+    prim: Node,
+}
+
+impl Columns<'_> {
+    fn write<T: Element>(&mut self, name: &str, type_name: &str, interpolation: &str, values: &[T]) -> io::Result<()> {
+        let value = self.out.array(values)?;
+        self.field(name, type_name, interpolation, value);
+        Ok(())
+    }
+
+    fn text(&mut self, name: &str, text: &str) {
+        let value = self.out.string(text);
+        self.field(name, "string", "constant", value);
+    }
+
+    fn field(&mut self, name: &str, type_name: &str, interpolation: &str, value: Rep) {
+        let node = self.out.attribute(self.prim, name, type_name);
+        let interpolation = self.out.token(interpolation);
+        self.out.field(node, "interpolation", interpolation);
+        self.out.field(node, "default", value);
+    }
+}
+
+/// Reads `path` back and compares it with what [`UsdHair`] was given: the facts; counts, ids and every column of every
+/// layer; the sizes and times of all samples; at the first and the last frame also that all values are finite and that
+/// the extent holds the points with their widths.
+pub fn verify(path: &Path, facts: &ShotFacts, layers: &[HairLayer]) -> Result<()> {
+    let bad = |what: String| FormatError::new(path, what).hint("the file is not what was exported: export it again");
+    if layers.is_empty() {
+        return CrateFile::open(path).map(drop);
+    }
+    let mut file = CrateFile::open(path)?;
+    let root = file.root();
+    let prims = match file.prims_below(root)?.first() {
+        Some(&hair) => file.prims_below(hair)?,
+        None => vec![],
+    };
+    if prims.len() != layers.len() {
+        return Err(bad(format!("has {} layers, expected {}", prims.len(), layers.len())));
+    }
+    for (&prim, layer) in prims.iter().zip(layers) {
+        verify_samples(&mut file, prim, facts, layer).map_err(|e| e.at(format!("layer {:?}", layer.name)))?;
+    }
+    for frame in [facts.frames.first(), facts.frames.last()].into_iter().flatten() {
+        let curves = read_curves(path, Some(f64::from(*frame)))?;
+        for ((read, layer), &prim) in curves.iter().zip(layers).zip(&prims) {
+            let place = format!("layer {:?}, frame {frame}", layer.name);
+            verify_layer(read, facts, layer).map_err(|what| bad(what).at(place.clone()))?;
+            verify_extent(&mut file, prim, *frame, read).map_err(|e| e.at(place))?;
+        }
+    }
+    Ok(())
+}
+
+/// Times and sizes of all samples of a layer.
+fn verify_samples(file: &mut CrateFile, prim: FileNode, facts: &ShotFacts, layer: &HairLayer) -> Result<()> {
+    let times: Vec<f64> = facts.frames.iter().map(|&f| f64::from(f)).collect();
+    let points = layer.offsets.total() as u64;
+    for (name, kind, len) in [("points", Type::Vec3f, points), ("velocities", Type::Vec3f, points), ("extent", Type::Vec3f, 2)] {
+        let samples = file.attribute(prim, name).and_then(|a| file.field(a, "timeSamples"));
+        let samples = samples.ok_or_else(|| file.bad(format!("has no samples of {name}")))?;
+        let (found, values) = file.samples(samples)?;
+        if found != times {
+            return Err(file.bad(format!("{name} is not sampled at the frames of the shot")));
+        }
+        for (value, time) in values.into_iter().zip(found) {
+            let n = file.array_len(value)?;
+            if n != len || value.kind() != Ok(kind) {
+                return Err(file.bad(format!("{name} at {time} has {n} values, expected {len}")));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// What was read against what was to be written; `Err` says what differs.
+fn verify_layer(read: &UsdCurves, facts: &ShotFacts, layer: &HairLayer) -> std::result::Result<(), String> {
+    let range = [facts.frames.first(), facts.frames.last()].map(|f| f64::from(f.copied().unwrap_or(0)));
+    let trio = [read.kind.as_str(), read.basis.as_str(), read.wrap.as_str()];
+    let same = [
+        ("metersPerUnit", read.stage.meters_per_unit == facts.meters_per_unit),
+        ("upAxis", read.stage.up == facts.up),
+        ("timeCodesPerSecond", read.stage.fps == facts.fps),
+        ("the range of frames", read.stage.range == Some(range)),
+        ("the origin", read.origin == facts.origin),
+        ("the kind of curve", trio == ["cubic", "catmullRom", "pinned"]),
+        ("the name", read.name == layer.name),
+        ("curveVertexCounts", read.offsets == layer.offsets),
+        ("hairId", read.id == layer.id),
+        ("st", read.root_uv == layer.root_uv),
+        ("skinprim", read.skin_face == layer.skin_face),
+        ("skinprimuv", read.skin_bary == layer.skin_bary),
+        ("rest", read.rest == layer.rest),
+        ("widths", read.width == layer.width),
+        ("displayColor", read.color == layer.color),
+        ("displayOpacity", read.opacity == layer.opacity),
+        ("the number of points", read.points.len() == layer.offsets.total()),
+        ("the number of velocities", read.velocity.len() == layer.offsets.total()),
+    ];
+    if let Some((what, _)) = same.iter().find(|(_, same)| !same) {
+        return Err(format!("{what} differs from what was exported"));
+    }
+    match Bounds::of(&read.points).and(Bounds::of(&read.velocity)) {
+        Some(_) => Ok(()),
+        None => Err("a position or velocity is not finite".into()),
+    }
+}
+
+/// The extent at `frame` holds the points.
+fn verify_extent(file: &mut CrateFile, prim: FileNode, frame: i32, read: &UsdCurves) -> Result<()> {
+    let samples = file.attribute(prim, "extent").and_then(|a| file.field(a, "timeSamples"));
+    let samples = samples.ok_or_else(|| file.bad("has no extent"))?;
+    let (times, values) = file.samples(samples)?;
+    let found = times.iter().position(|&t| t == f64::from(frame)).map(|i| values[i]);
+    let extent = file.floats(found.ok_or_else(|| file.bad("has no extent at this frame"))?, 3)?;
+    let pad = read.width.iter().copied().fold(0.0, f32::max) / 2.0;
+    let holds = Bounds::of(&read.points).is_some_and(|b| {
+        let [min, max] = b.padded(pad);
+        extent.len() == 6 && (0..3).all(|k| extent[k] <= min[k] && extent[k + 3] >= max[k])
+    });
+    if holds { Ok(()) } else { Err(file.bad("the extent does not hold the points")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::format::check::samples;
+
+    /// Writes the sample shot; returns its bytes.
+    fn write(path: &Path, facts: &ShotFacts, layers: &[HairLayer]) -> Vec<u8> {
+        let mut out = UsdHair::create(path, facts, layers).unwrap();
+        for &frame in &facts.frames {
+            let data: Vec<_> = layers.iter().map(|l| samples::frame(l, frame)).collect();
+            let data: Vec<_> = data.iter().map(|(p, v)| HairFrame { position: p, velocity: v }).collect();
+            out.write_frame(frame, &data).unwrap();
+        }
+        out.finish().unwrap();
+        std::fs::read(path).unwrap()
+    }
+
+    fn check_curves(curves: &[UsdCurves], facts: &ShotFacts, layers: &[HairLayer], frame: i32) {
+        assert_eq!(curves.len(), layers.len());
+        for (read, layer) in curves.iter().zip(layers) {
+            verify_layer(read, facts, layer).unwrap();
+            let (position, velocity) = samples::frame(layer, frame);
+            assert_eq!((&read.points, &read.velocity), (&position, &velocity));
+            assert_eq!(read.notes, Vec::<String>::new());
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_read_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let (facts, layers) = samples::shot();
+        let path = dir.path().join("a.usdc");
+        let bytes = write(&path, &facts, &layers);
+        verify(&path, &facts, &layers).unwrap();
+        for &frame in &facts.frames {
+            check_curves(&read_curves(&path, Some(f64::from(frame))).unwrap(), &facts, &layers, frame);
+        }
+        check_curves(&read_curves(&path, None).unwrap(), &facts, &layers, facts.frames[0]);
+        let curves = read_curves(&path, Some(5000.0)).unwrap();
+        check_curves(&curves, &facts, &layers, facts.frames[2]);
+        assert_eq!(curves[0].path, "/Hair/over_coat");
+        assert_eq!(curves[1].path, "/Hair/_2nd");
+        // Between two frames, points are halfway.
+        let between = read_curves(&path, Some(1001.5)).unwrap();
+        let (a, b) = (samples::frame(&layers[0], 1001).0, samples::frame(&layers[0], 1002).0);
+        for (k, p) in between[0].points.iter().enumerate() {
+            assert!((0..3).all(|i| (p[i] - 0.5 * (a[k][i] + b[k][i])).abs() < 1e-6));
+        }
+        // The same shot gives the same bytes.
+        assert_eq!(bytes, write(&dir.path().join("b.usdc"), &facts, &layers));
+    }
+
+    #[test]
+    fn names_become_valid_and_different() {
+        let names = ["a b", "a_b", "é", "", "9", "a:b"];
+        assert_eq!(identifiers(names.into_iter()), ["a_b", "a_b_2", "_", "__2", "_9", "a_b_3"]);
+    }
+
+    #[test]
+    fn an_empty_layer_and_no_layers_are_files_too() {
+        let dir = tempfile::tempdir().unwrap();
+        let (facts, mut layers) = samples::shot();
+        layers[0] = HairLayer { name: "bald".into(), ..HairLayer::default() };
+        let path = dir.path().join("a.usdc");
+        write(&path, &facts, &layers);
+        verify(&path, &facts, &layers).unwrap();
+        write(&path, &facts, &[]);
+        verify(&path, &facts, &[]).unwrap();
+        assert!(read_curves(&path, None).unwrap_err().to_string().contains("no BasisCurves"));
+    }
+
+    #[test]
+    fn verify_finds_what_differs() {
+        let dir = tempfile::tempdir().unwrap();
+        let (facts, layers) = samples::shot();
+        let path = dir.path().join("a.usdc");
+        write(&path, &facts, &layers);
+        let mut other = layers.clone();
+        other[1].id[0] += 1;
+        assert!(verify(&path, &facts, &other).unwrap_err().to_string().contains("hairId"));
+        let mut other = layers.clone();
+        other[0].width.iter_mut().for_each(|w| *w *= 2.0);
+        assert!(verify(&path, &facts, &other).unwrap_err().to_string().contains("widths"));
+        let other = ShotFacts { meters_per_unit: 1.0, ..facts.clone() };
+        assert!(verify(&path, &other, &layers).unwrap_err().to_string().contains("metersPerUnit"));
+        let other = ShotFacts { frames: vec![1001, 1002], ..facts.clone() };
+        assert!(verify(&path, &other, &layers).is_err());
+        assert!(verify(&path, &facts, &layers[..1]).is_err());
+    }
+
+    #[test]
+    fn an_unfinished_file_does_not_open() {
+        let dir = tempfile::tempdir().unwrap();
+        let (facts, layers) = samples::shot();
+        let path = dir.path().join("a.usdc");
+        let mut out = UsdHair::create(&path, &facts, &layers).unwrap();
+        let data: Vec<_> = layers.iter().map(|l| samples::frame(l, 1001)).collect();
+        let data: Vec<_> = data.iter().map(|(p, v)| HairFrame { position: p, velocity: v }).collect();
+        assert!(out.write_frame(1002, &data).unwrap_err().to_string().contains("out of order"));
+        out.write_frame(1001, &data).unwrap();
+        let error = out.finish().unwrap_err().to_string();
+        assert!(error.contains("1 of 3 frames") && error.contains("frame 1002"), "{error}");
+        assert!(read_curves(&path, None).is_err());
+    }
+
+    /// Neither a changed byte nor a lost end may panic, hang or pass for a whole file with other tables.
+    #[test]
+    fn broken_files_are_errors() {
+        let dir = tempfile::tempdir().unwrap();
+        let (facts, mut layers) = samples::shot();
+        layers.truncate(1);
+        let path = dir.path().join("a.usdc");
+        let bytes = write(&path, &facts, &layers);
+        let broken = dir.path().join("broken.usdc");
+        for n in (0..bytes.len()).step_by(7).chain(bytes.len() - 40..bytes.len()) {
+            std::fs::write(&broken, &bytes[..n]).unwrap();
+            assert!(read_curves(&broken, Some(1002.0)).is_err(), "the first {n} bytes were read as a file");
+        }
+        let mut read = 0;
+        for i in 0..bytes.len() {
+            let mut bad = bytes.clone();
+            bad[i] ^= [0x01, 0x80, 0xff, 0x10][i % 4];
+            std::fs::write(&broken, &bad).unwrap();
+            if let Ok(curves) = read_curves(&broken, Some(1002.0)) {
+                read += 1;
+                for c in &curves {
+                    assert_eq!(c.points.len(), c.offsets.total());
+                    assert!(c.id.is_empty() || c.id.len() == c.offsets.len());
+                }
+            }
+            if i % 5 == 0 {
+                let _ = verify(&broken, &facts, &layers);
+            }
+        }
+        assert!(read > 0);
+    }
+
+    #[test]
+    fn other_files_are_refused_with_advice() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.usd");
+        for (content, word) in [(&b"#usda 1.0\n"[..], ".usda"), (b"PK\x03\x04", ".usdz"), (b"ply\n", "PXR-USDC"), (b"", "PXR-USDC")] {
+            std::fs::write(&path, content).unwrap();
+            let error = read_curves(&path, None).unwrap_err();
+            assert!(error.what.contains(word) && !error.hint.is_empty(), "{error}");
+        }
+        let mut newer = [0u8; 200];
+        newer[..10].copy_from_slice(b"PXR-USDC\0\x63");
+        std::fs::write(&path, newer).unwrap();
+        assert!(read_curves(&path, None).unwrap_err().what.contains("0.99"));
+        assert!(read_curves(&dir.path().join("none.usdc"), None).is_err());
+    }
+}
