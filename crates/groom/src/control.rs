@@ -3,7 +3,30 @@
 //! "Course notes 2003, A production pipeline for hair", §3.2: a control hair is attached to a point of the skin and its
 //! vertices are kept in [N, dU, N x dU] coordinates there, so that one file serves every frame.
 
-use pelage_geom::{Frame, NONE, SurfacePoint, Vec3};
+use pelage_geom::{Frame, Mesh, NONE, Pose, SurfacePoint, Topology, Vec3};
+
+/// A skin in its rest pose, as grooming reads it.
+#[derive(Clone, Copy, Debug)]
+pub struct Skin<'a> {
+    /// The mesh of the rest pose.
+    pub mesh: &'a Mesh,
+    /// Its connectivity.
+    pub topology: &'a Topology,
+    /// Its normals and tangents.
+    pub rest: &'a Pose,
+}
+
+impl Skin<'_> {
+    /// Root frame at a point of the rest skin.
+    pub fn frame(&self, p: &SurfacePoint) -> Frame {
+        self.rest.frame(self.mesh, self.topology, p)
+    }
+
+    /// Texture coordinates of a point; zero without texture coordinates.
+    pub fn uv(&self, p: &SurfacePoint) -> [f32; 2] {
+        if self.mesh.corner_uv.is_empty() { [0.0; 2] } else { self.mesh.uv(p) }
+    }
+}
 
 /// H control hairs of P points each, kept in the frames of their roots.
 #[derive(Clone, Debug, Default, PartialEq)]
