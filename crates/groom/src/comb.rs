@@ -1,0 +1,519 @@
+//! Combing: a list of operations that turn and scale the segments of control hairs on the rest skin.
+//!
+//! After "Course notes 2003, A production pipeline for hair", §3.2: combing direction curves, degree of bending and
+//! curvature, region of influence with a falloff. An operation never shortens a segment except [`CombKind::Length`]:
+//! directions change, the hair is built up again from its root.
+//!
+//! With `a` the amount of an operation at a hair (its weight, region map, falloff and bend multiplied), segment k turns by
+//! the fraction `a * profile(s)` of the way to its target, where `s` runs from 0 at the first segment to 1 at the last
+//! (by length before the segment) and `profile(s) = 1 - c + c s` for curvature `c`: 0 tilts the whole hair at the root, 1
+//! leaves the root as it is and bends the tip.
+
+use crate::control::{ControlHairs, Skin, to_local, to_world, vec3};
+use pelage_geom::{Frame, TiledMap, Vec3};
+use rayon::prelude::*;
+
+/// Elevation over the root's tangent plane that a laid-down hair keeps, radians (2 degrees). At 0 rounding puts half of
+/// the hairs under the skin and the push-up has to lift them; at 10 degrees fur laid flat visibly stands.
+const FLAT_ELEVATION: f64 = 2.0 * std::f64::consts::PI / 180.0;
+
+/// Painted directions shorter than this say nothing. Mid-grey in 8 bits (128 / 255) decodes to a length of 0.007, which
+/// must not count; a painted unit vector blurred over a fan of 90 degrees still has a length of 0.6.
+const UNPAINTED: f64 = 0.02;
+
+/// One step of combing.
+#[derive(Clone, Debug)]
+pub struct CombOp<'a> {
+    /// What to do.
+    pub kind: CombKind<'a>,
+    /// Overall weight; 0 leaves every hair byte for byte.
+    pub weight: f64,
+    /// Map multiplied onto the weight, read at the texture coordinates of the hair's root.
+    pub region: Option<&'a TiledMap>,
+    /// Only the hairs on one side of a parting: (index of the parting, +1 left or -1 right).
+    pub side: Option<(u32, i8)>,
+}
+
+/// The kinds of combing.
+#[derive(Clone, Debug)]
+pub enum CombKind<'a> {
+    /// Toward the direction of a drawn curve at its point nearest to the hair's root.
+    DirectionCurve {
+        /// Polyline in rest scene space, at least two points; hairs turn toward its direction of travel.
+        points: Vec<Vec3>,
+        /// Distance of the root from the curve where its influence ends, scene units; infinite for everywhere.
+        radius: f64,
+        /// Part of the radius over which influence fades (smoothstep): 0 a hard edge, 1 from the curve outward.
+        falloff: f64,
+        /// How far toward the curve's direction, 0 to 1.
+        bend: f64,
+        /// Where along the hair, 0 to 1 (module documentation).
+        curvature: f64,
+    },
+    /// Toward a direction painted as colour: 2 c - 1.
+    DirectionMap {
+        /// RGB in [0, 1].
+        map: &'a TiledMap,
+        /// What r, g, b are coordinates of.
+        space: DirectionSpace,
+        /// How far toward the painted direction, 0 to 1.
+        bend: f64,
+        /// Where along the hair, 0 to 1.
+        curvature: f64,
+    },
+    /// Turns segments in the plane of the normal and the hair's lean, away from the normal. The lean is the part of
+    /// root to tip in the tangent plane, for an upright hair dU.
+    Bend {
+        /// Angle at the tip (with curvature 0 everywhere), degrees; negative straightens up.
+        angle: f64,
+        /// Map multiplied onto the angle.
+        map: Option<&'a TiledMap>,
+        /// Where along the hair, 0 to 1.
+        curvature: f64,
+    },
+    /// Lowers every segment toward the root's tangent plane and keeps its azimuth: elevation e becomes
+    /// `e + a (2 degrees - e)`.
+    LayDown {
+        /// 0 to 1: 1 lies flat, but for 2 degrees.
+        amount: f64,
+        /// Map multiplied onto the amount.
+        map: Option<&'a TiledMap>,
+    },
+    /// Multiplies lengths by `1 + weight (value * map - 1)`, not less than 1/1000.
+    Length {
+        /// Factor.
+        value: f64,
+        /// Map multiplied onto the factor.
+        map: Option<&'a TiledMap>,
+    },
+}
+
+/// Space of a painted direction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DirectionSpace {
+    /// Red, green, blue along N, dU, N x dU of the root.
+    Root,
+    /// Red, green, blue along x, y, z of the scene.
+    World,
+}
+
+/// What one operation did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CombCounts {
+    /// Hairs it changed.
+    pub combed: usize,
+    /// Hairs left alone because the painted direction says nothing there.
+    pub unpainted: usize,
+}
+
+/// Applies `ops` in order to all hairs on the rest skin; `partings` are the polylines of the partings, rest scene space.
+/// Returns counts per operation.
+pub fn comb(skin: &Skin, partings: &[Vec<Vec3>], ops: &[CombOp], hairs: &mut ControlHairs) -> Vec<CombCounts> {
+    let mut counts = vec![CombCounts::default(); ops.len()];
+    let frames: Vec<Frame> = hairs.root.par_iter().map(|p| skin.frame(p)).collect();
+    for (op, count) in ops.iter().zip(&mut counts) {
+        let (root, side, parting, points) = (&hairs.root, &hairs.side, &hairs.parting, hairs.points);
+        let outcome = |(h, local): (usize, &mut [[f32; 3]])| {
+            let frame = &frames[h];
+            let uv = skin.uv(&root[h]);
+            let mut weight = op.weight * op.region.map_or(1.0, |m| f64::from(m.value(uv)));
+            if let Some((p, wanted)) = op.side {
+                let known = if parting[h] == p { Some(side[h]) } else { None };
+                let side = known.or_else(|| Some(side_of(partings.get(p as usize)?, frame.origin, frame.n)));
+                weight *= share(side.unwrap_or(0), wanted);
+            }
+            if weight == 0.0 {
+                return CombCounts::default();
+            }
+            apply(&op.kind, weight, uv, frame, local)
+        };
+        *count = hairs.local.par_chunks_mut(points).enumerate().map(outcome).reduce(CombCounts::default, |a, b| {
+            CombCounts { combed: a.combed + b.combed, unpainted: a.unpainted + b.unpainted }
+        });
+    }
+    counts
+}
+
+/// Part of an operation for one side that a hair on `side` gets; a hair on the line itself gets half.
+fn share(side: i8, wanted: i8) -> f64 {
+    match side {
+        0 => 0.5,
+        s if s == wanted => 1.0,
+        _ => 0.0,
+    }
+}
+
+/// Side of a point of the skin of normal `n` seen from a polyline: +1 left, -1 right (from outside, looking along it), by
+/// its nearest point; 0 on the line or for less than two points.
+pub fn side_of(line: &[Vec3], at: Vec3, n: Vec3) -> i8 {
+    let Some((near, tangent)) = nearest(line, at) else { return 0 };
+    let across = (at - near).dot(&n.cross(&tangent));
+    if across > 0.0 {
+        1
+    } else if across < 0.0 {
+        -1
+    } else {
+        0
+    }
+}
+
+/// Nearest point of a polyline and its direction there, which turns evenly from corner to corner; `None` for a line
+/// without length.
+fn nearest(line: &[Vec3], at: Vec3) -> Option<(Vec3, Vec3)> {
+    let direction = |i: usize| (line[i + 1] - line[i]).try_normalize(0.0);
+    let mut best: Option<(f64, usize, f64, Vec3)> = None;
+    for i in 0..line.len().saturating_sub(1) {
+        let v = line[i + 1] - line[i];
+        if v.norm_squared() == 0.0 {
+            continue;
+        }
+        let f = ((at - line[i]).dot(&v) / v.norm_squared()).clamp(0.0, 1.0);
+        let p = line[i] + v * f;
+        let d = (at - p).norm_squared();
+        if best.is_none_or(|b| d < b.0) {
+            best = Some((d, i, f, p));
+        }
+    }
+    let (_, i, f, p) = best?;
+    let here = direction(i)?;
+    let before = (0..i).rev().find_map(direction).unwrap_or(here);
+    let after = (i + 1..line.len() - 1).find_map(direction).unwrap_or(here);
+    let corner = |a: Vec3, b: Vec3| (a + b).try_normalize(1e-6).unwrap_or(here);
+    let tangent = corner(before, here) * (1.0 - f) + corner(here, after) * f;
+    Some((p, tangent.try_normalize(1e-6).unwrap_or(here)))
+}
+
+/// One operation on one hair (points relative to the root, in the root frame).
+fn apply(kind: &CombKind, weight: f64, uv: [f32; 2], frame: &Frame, local: &mut [[f32; 3]]) -> CombCounts {
+    let value = |map: &Option<&TiledMap>| map.map_or(1.0, |m| f64::from(m.value(uv)));
+    let combed = CombCounts { combed: 1, unpainted: 0 };
+    match kind {
+        CombKind::DirectionCurve { points, radius, falloff, bend, curvature } => {
+            let Some((near, tangent)) = nearest(points, frame.origin) else { return CombCounts::default() };
+            let a = weight * bend * influence((near - frame.origin).norm(), *radius, *falloff);
+            turn_toward(to_local(frame, tangent), a, *curvature, local)
+        }
+        CombKind::DirectionMap { map, space, bend, curvature } => {
+            let c = vec3(map.sample(uv)) * 2.0 - Vec3::repeat(1.0);
+            if c.norm() < UNPAINTED {
+                return CombCounts { combed: 0, unpainted: 1 };
+            }
+            let target = if *space == DirectionSpace::Root { c } else { to_local(frame, c) };
+            turn_toward(target.normalize(), weight * bend, *curvature, local)
+        }
+        CombKind::Bend { angle, map, curvature } => {
+            let angle = (angle * weight * value(map)).to_radians();
+            if angle == 0.0 {
+                return CombCounts::default();
+            }
+            let axis = Vec3::x().cross(&lean(local));
+            rebuild(local, |d, s| rotate(d, axis, angle * (1.0 - curvature + curvature * s)));
+            combed
+        }
+        CombKind::LayDown { amount, map } => {
+            let a = (amount * weight * value(map)).clamp(0.0, 1.0);
+            if a == 0.0 {
+                return CombCounts::default();
+            }
+            let lean = lean(local);
+            rebuild(local, |d, _| {
+                let e = libm::asin(d.x.clamp(-1.0, 1.0));
+                let e = e + a * (FLAT_ELEVATION - e);
+                let azimuth = Vec3::new(0.0, d.y, d.z).try_normalize(1e-6).unwrap_or(lean);
+                Vec3::x() * libm::sin(e) + azimuth * libm::cos(e)
+            });
+            combed
+        }
+        CombKind::Length { value: factor, map } => {
+            let f = (1.0 + weight * (factor * value(map) - 1.0)).max(1e-3);
+            if f == 1.0 {
+                return CombCounts::default();
+            }
+            local.iter_mut().flatten().for_each(|x| *x = (f64::from(*x) * f) as f32);
+            combed
+        }
+    }
+}
+
+/// Influence at a distance from a curve.
+fn influence(distance: f64, radius: f64, falloff: f64) -> f64 {
+    if radius.is_infinite() {
+        return 1.0;
+    }
+    let inner = radius * (1.0 - falloff.clamp(0.0, 1.0));
+    if distance <= inner {
+        1.0
+    } else if distance >= radius {
+        0.0
+    } else {
+        let t = (radius - distance) / (radius - inner);
+        t * t * (3.0 - 2.0 * t)
+    }
+}
+
+/// Turns segments by `a * profile` of the way to one target direction.
+fn turn_toward(target: Vec3, a: f64, curvature: f64, local: &mut [[f32; 3]]) -> CombCounts {
+    if a == 0.0 {
+        return CombCounts::default();
+    }
+    rebuild(local, |d, s| slerp(d, target, (a * (1.0 - curvature + curvature * s)).clamp(0.0, 1.0)));
+    CombCounts { combed: 1, unpainted: 0 }
+}
+
+/// Unit direction in the tangent plane toward which a hair leans; dU if it stands upright.
+fn lean(local: &[[f32; 3]]) -> Vec3 {
+    let tip = vec3(local[local.len() - 1]);
+    let flat = Vec3::new(0.0, tip.y, tip.z);
+    if flat.norm() <= 1e-4 * tip.norm() { Vec3::y() } else { flat.normalize() }
+}
+
+/// Gives each segment the direction `turn(direction, s)` at its old length, from the root up.
+fn rebuild(local: &mut [[f32; 3]], turn: impl Fn(Vec3, f64) -> Vec3) {
+    let segment: Vec<Vec3> = local.windows(2).map(|w| vec3(w[1]) - vec3(w[0])).collect();
+    let last: f64 = segment[..segment.len() - 1].iter().map(|v| v.norm()).sum();
+    let (mut at, mut before) = (vec3(local[0]), 0.0);
+    for (v, out) in segment.iter().zip(&mut local[1..]) {
+        let length = v.norm();
+        let s = if last > 0.0 { f64::min(before / last, 1.0) } else { 1.0 };
+        if length > 0.0 {
+            at += turn(v / length, s).normalize() * length;
+        }
+        before += length;
+        *out = [at.x as f32, at.y as f32, at.z as f32];
+    }
+}
+
+/// Direction a fraction `f` of the way from unit `a` to unit `b` on their great circle. From opposite directions the way
+/// leads over x (in the root frame the normal), or over y if they are along x.
+pub(crate) fn slerp(a: Vec3, b: Vec3, f: f64) -> Vec3 {
+    let axis = a.cross(&b);
+    let sine = axis.norm();
+    let angle = libm::atan2(sine, a.dot(&b));
+    if sine > 1e-9 {
+        return rotate(a, axis / sine, angle * f);
+    }
+    if a.dot(&b) > 0.0 {
+        return if f >= 1.0 { b } else { a };
+    }
+    let over = if a.x.abs() < 0.999 { Vec3::x() } else { Vec3::y() };
+    rotate(a, a.cross(&over).normalize(), angle * f)
+}
+
+/// Rotation about a unit axis (Rodrigues).
+pub(crate) fn rotate(v: Vec3, axis: Vec3, angle: f64) -> Vec3 {
+    let (s, c) = (libm::sin(angle), libm::cos(angle));
+    v * c + axis.cross(&v) * s + axis * (axis.dot(&v) * (1.0 - c))
+}
+
+/// A hair in world space from its root frame: its points, root first.
+pub(crate) fn world_points(frame: &Frame, local: &[[f32; 3]]) -> Vec<Vec3> {
+    local.iter().map(|&p| frame.origin + to_world(frame, vec3(p))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::place::{PlaceSettings, Placement, place};
+    use crate::test_skin::TestSkin;
+    use pelage_geom::{Map, Wrap};
+
+    fn groomed() -> (TestSkin, ControlHairs) {
+        let s = TestSkin::new(24, 12, 0.5);
+        let settings = PlaceSettings {
+            placement: Placement::Grid { u: 5, v: 6 },
+            points: 6,
+            length: 3.0,
+            length_map: None,
+            partings: &[],
+            parting_spacing: 1.0,
+        };
+        let (hairs, _, _) = place(&s.skin(), &s.bvh, &settings);
+        (s, hairs)
+    }
+
+    fn op(kind: CombKind<'_>) -> CombOp<'_> {
+        CombOp { kind, weight: 1.0, region: None, side: None }
+    }
+
+    fn curve(radius: f64, bend: f64, curvature: f64) -> CombKind<'static> {
+        let points = vec![Vec3::new(-20.0, 12.0, 0.0), Vec3::new(20.0, 12.0, 5.0)];
+        CombKind::DirectionCurve { points, radius, falloff: 0.5, bend, curvature }
+    }
+
+    fn flat(value: &[f32]) -> TiledMap {
+        let map = Map { width: 1, height: 1, channels: value.len(), data: value.to_vec() };
+        TiledMap { tiles: vec![(0, map)], wrap: Wrap::Clamp }
+    }
+
+    fn all_ops<'a>(rgb: &'a TiledMap, half: &'a TiledMap) -> Vec<CombOp<'a>> {
+        [
+            curve(f64::INFINITY, 0.7, 0.6),
+            CombKind::DirectionMap { map: rgb, space: DirectionSpace::Root, bend: 0.5, curvature: 0.3 },
+            CombKind::Bend { angle: 40.0, map: Some(half), curvature: 1.0 },
+            CombKind::LayDown { amount: 0.8, map: None },
+            CombKind::Length { value: 1.5, map: Some(half) },
+        ]
+        .into_iter()
+        .map(op)
+        .collect()
+    }
+
+    #[test]
+    fn weight_zero_changes_no_byte() {
+        let (s, mut hairs) = groomed();
+        let (rgb, half, zero) = (flat(&[0.9, 0.7, 0.2]), flat(&[0.5]), flat(&[0.0]));
+        comb(&s.skin(), &[], &all_ops(&rgb, &half), &mut hairs);
+        let before = hairs.clone();
+        let mut ops = all_ops(&rgb, &half);
+        ops.iter_mut().for_each(|o| o.weight = 0.0);
+        let mut regions = all_ops(&rgb, &half);
+        regions.iter_mut().for_each(|o| o.region = Some(&zero));
+        ops.extend(regions);
+        ops.push(op(curve(0.5, 1.0, 0.0)));
+        let counts = comb(&s.skin(), &[], &ops, &mut hairs);
+        assert!(counts.iter().all(|c| c.combed == 0));
+        assert_eq!(before, hairs);
+    }
+
+    #[test]
+    fn only_the_length_operation_changes_lengths() {
+        let (s, mut hairs) = groomed();
+        let (rgb, half) = (flat(&[0.9, 0.7, 0.2]), flat(&[0.5]));
+        for (i, o) in all_ops(&rgb, &half).into_iter().enumerate() {
+            let factor = if i == 4 { 0.75 } else { 1.0 };
+            let before = hairs.clone();
+            let counts = comb(&s.skin(), &[], &[o], &mut hairs);
+            assert_eq!(counts[0].combed, hairs.len());
+            assert_ne!(before, hairs);
+            for h in 0..hairs.len() {
+                assert!((hairs.length(h) - factor * before.length(h)).abs() < 1e-6 * 3.0);
+                assert_eq!(hairs.hair(h)[0], [0.0; 3]);
+            }
+        }
+    }
+
+    #[test]
+    fn a_full_bend_without_curvature_aligns_with_the_curve() {
+        let (s, mut hairs) = groomed();
+        comb(&s.skin(), &[], &[op(curve(f64::INFINITY, 1.0, 0.0))], &mut hairs);
+        let target = Vec3::new(40.0, 0.0, 5.0).normalize();
+        for h in 0..hairs.len() {
+            let line = world_points(&s.skin().frame(&hairs.root[h]), hairs.hair(h));
+            for w in line.windows(2) {
+                assert!(((w[1] - w[0]).normalize() - target).norm() < 1e-5);
+            }
+        }
+    }
+
+    #[test]
+    fn curvature_leaves_the_root_and_bends_the_tip() {
+        let (s, mut hairs) = groomed();
+        comb(&s.skin(), &[], &[op(curve(f64::INFINITY, 1.0, 1.0))], &mut hairs);
+        let target = Vec3::new(40.0, 0.0, 5.0).normalize();
+        for h in 0..hairs.len() {
+            let f = s.skin().frame(&hairs.root[h]);
+            let line = world_points(&f, hairs.hair(h));
+            let angle: Vec<f64> =
+                line.windows(2).map(|w| (w[1] - w[0]).normalize().dot(&target).min(1.0).acos_()).collect();
+            assert!(((line[1] - line[0]).normalize() - f.n).norm() < 1e-5);
+            assert!(angle[4] < 1e-3);
+            // Equal steps along the great circle.
+            for k in 0..5 {
+                assert!((angle[k] - angle[0] * (1.0 - k as f64 / 4.0)).abs() < 1e-3, "{angle:?}");
+            }
+        }
+    }
+
+    trait Acos {
+        fn acos_(self) -> f64;
+    }
+    impl Acos for f64 {
+        fn acos_(self) -> f64 {
+            libm::acos(self)
+        }
+    }
+
+    #[test]
+    fn influence_ends_at_the_radius_and_fades_as_told() {
+        assert_eq!(influence(1e9, f64::INFINITY, 0.5), 1.0);
+        assert_eq!(influence(1.99, 2.0, 0.0), 1.0);
+        assert_eq!(influence(2.0, 2.0, 0.0), 0.0);
+        assert_eq!(influence(1.0, 2.0, 0.5), 1.0);
+        assert!((influence(1.5, 2.0, 0.5) - 0.5).abs() < 1e-12);
+        assert!((influence(1.0, 2.0, 1.0) - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn laying_down_keeps_the_azimuth_and_ends_near_the_tangent_plane() {
+        let (s, mut hairs) = groomed();
+        comb(&s.skin(), &[], &[op(curve(f64::INFINITY, 0.4, 0.5))], &mut hairs);
+        let before = hairs.clone();
+        comb(&s.skin(), &[], &[op(CombKind::LayDown { amount: 1.0, map: None })], &mut hairs);
+        for h in 0..hairs.len() {
+            for k in 0..5 {
+                let segment = |c: &ControlHairs| (vec3(c.hair(h)[k + 1]) - vec3(c.hair(h)[k])).normalize();
+                let (a, b) = (segment(&before), segment(&hairs));
+                assert!((b.x - libm::sin(FLAT_ELEVATION)).abs() < 1e-4);
+                assert!((a.y * b.z - a.z * b.y).abs() < 1e-4);
+            }
+        }
+    }
+
+    #[test]
+    fn a_bend_turns_the_tip_by_its_angle() {
+        let (s, mut hairs) = groomed();
+        comb(&s.skin(), &[], &[op(CombKind::Bend { angle: 90.0, map: None, curvature: 1.0 })], &mut hairs);
+        for h in 0..hairs.len() {
+            let p = hairs.hair(h);
+            assert!((p[1][0] - 0.6).abs() < 1e-6 && (p[5][0] - p[4][0]).abs() < 1e-6 && p[5][1] - p[4][1] > 0.599);
+        }
+    }
+
+    #[test]
+    fn painted_directions_are_read_in_their_space_and_grey_says_nothing() {
+        let (s, mut hairs) = groomed();
+        let upright = hairs.clone();
+        let grey = flat(&[128.0 / 255.0; 3]);
+        let map = |map, space| op(CombKind::DirectionMap { map, space, bend: 1.0, curvature: 0.0 });
+        let counts = comb(&s.skin(), &[], &[map(&grey, DirectionSpace::World)], &mut hairs);
+        assert_eq!((counts[0].unpainted, &hairs), (hairs.len(), &upright));
+        let along_z = flat(&[0.5, 0.5, 1.0]);
+        comb(&s.skin(), &[], &[map(&along_z, DirectionSpace::Root)], &mut hairs);
+        assert!((0..hairs.len()).all(|h| (vec3(hairs.hair(h)[5]) - Vec3::z() * 3.0).norm() < 1e-5));
+        comb(&s.skin(), &[], &[map(&along_z, DirectionSpace::World)], &mut hairs);
+        for h in 0..hairs.len() {
+            let line = world_points(&s.skin().frame(&hairs.root[h]), hairs.hair(h));
+            assert!((line[5] - line[0] - Vec3::z() * 3.0).norm() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn sides_of_a_parting() {
+        let line = [Vec3::new(0.0, 0.0, 0.0), Vec3::new(1.0, 0.0, 0.0), Vec3::new(1.0, 1.0, 0.0)];
+        let up = Vec3::z();
+        assert_eq!(side_of(&line, Vec3::new(0.5, 0.1, 0.3), up), 1);
+        assert_eq!(side_of(&line, Vec3::new(0.5, -0.1, 0.0), up), -1);
+        assert_eq!(side_of(&line, Vec3::new(0.9, 0.5, 0.0), up), 1);
+        assert_eq!(side_of(&line, Vec3::new(1.4, -0.3, 0.0), up), -1);
+        assert_eq!(side_of(&line, Vec3::new(0.5, 0.1, 0.3), -up), -1);
+        assert_eq!(side_of(&line, Vec3::new(0.5, 0.0, 0.0), up), 0);
+        let (s, mut hairs) = groomed();
+        let parting = vec![vec![Vec3::new(-10.0, 10.0, 0.0), Vec3::new(10.0, 10.0, 0.0)]];
+        let before = hairs.clone();
+        let left = CombOp { side: Some((0, 1)), ..op(curve(f64::INFINITY, 1.0, 0.0)) };
+        comb(&s.skin(), &parting, &[left], &mut hairs);
+        for h in 0..hairs.len() {
+            let f = s.skin().frame(&hairs.root[h]);
+            let side = side_of(&parting[0], f.origin, f.n);
+            assert_eq!(before.hair(h) == hairs.hair(h), side == -1, "{side}");
+        }
+    }
+
+    #[test]
+    fn opposite_directions_turn_over_the_normal() {
+        let half = slerp(Vec3::y(), -Vec3::y(), 0.5);
+        assert!((half - Vec3::x()).norm() < 1e-12, "{half}");
+        assert!((slerp(Vec3::x(), -Vec3::x(), 1.0) + Vec3::x()).norm() < 1e-12);
+        assert!((slerp(Vec3::x(), Vec3::z(), 1.0) - Vec3::z()).norm() < 1e-12);
+    }
+}
