@@ -8,3 +8,6 @@ pub mod place;
 pub mod push_up;
 #[cfg(test)]
 mod test_skin;
+mod area_curve;
+pub mod candidates;
+mod point_grid;
