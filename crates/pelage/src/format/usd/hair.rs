@@ -449,9 +449,9 @@ mod tests {
             assert!(read_curves(&broken, Some(1002.0)).is_err(), "the first {n} bytes were read as a file");
         }
         let mut read = 0;
-        for i in 0..bytes.len() {
+        for i in (0..bytes.len()).step_by(2) {
             let mut bad = bytes.clone();
-            bad[i] ^= [0x01, 0x80, 0xff, 0x10][i % 4];
+            bad[i] ^= [0x01, 0x80, 0xff, 0x10][i / 2 % 4];
             std::fs::write(&broken, &bad).unwrap();
             if let Ok(curves) = read_curves(&broken, Some(1002.0)) {
                 read += 1;
@@ -460,7 +460,7 @@ mod tests {
                     assert!(c.id.is_empty() || c.id.len() == c.offsets.len());
                 }
             }
-            if i % 5 == 0 {
+            if i % 10 == 0 {
                 let _ = verify(&broken, &facts, &layers);
             }
         }
