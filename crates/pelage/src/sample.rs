@@ -1,0 +1,3 @@
+//! Samples that Pelage makes itself: skins, motions, maps and grooms by formula, always the same bytes.
+
+use crate::cli::Sample;
