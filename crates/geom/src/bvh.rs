@@ -180,7 +180,8 @@ impl Bvh {
         let shear = Shear::new(origin, direction)?;
         let inverse = direction.map(|d| 1.0 / d);
         let mut best: Option<(usize, [f64; 2])> = None;
-        let mut reach = max_t;
+        // Finite, so that a box that is missed (infinite) is never within reach.
+        let mut reach = max_t.min(f64::MAX);
         let mut stack = [(0u32, 0.0f64); STACK];
         let mut depth = 0;
         let mut k = 0;
