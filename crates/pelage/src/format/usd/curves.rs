@@ -194,7 +194,9 @@ fn floats_at(file: &mut CrateFile, attribute: Node, arity: usize, frame: Option<
     if let Some((rep, w)) = pick.high {
         let high = file.floats(rep, arity)?;
         if high.len() == low.len() {
-            low.iter_mut().zip(high).for_each(|(a, b)| *a = (f64::from(*a) + w * (f64::from(b) - f64::from(*a))) as f32);
+            low.iter_mut()
+                .zip(high)
+                .for_each(|(a, b)| *a = (f64::from(*a) + w * (f64::from(b) - f64::from(*a))) as f32);
         }
     }
     Ok(Some(low))
@@ -263,12 +265,24 @@ impl Columns<'_> {
     }
 }
 
-fn read_prim(file: &mut CrateFile, prim: Node, path: String, frame: Option<f64>, stage: &UsdStage) -> Result<UsdCurves> {
+fn read_prim(
+    file: &mut CrateFile,
+    prim: Node,
+    path: String,
+    frame: Option<f64>,
+    stage: &UsdStage,
+) -> Result<UsdCurves> {
     let place = |e: FormatError| if e.at.is_none() { e.at(path.clone()) } else { e };
     read_columns(file, prim, &path, frame, stage).map_err(place)
 }
 
-fn read_columns(file: &mut CrateFile, prim: Node, path: &str, frame: Option<f64>, stage: &UsdStage) -> Result<UsdCurves> {
+fn read_columns(
+    file: &mut CrateFile,
+    prim: Node,
+    path: &str,
+    frame: Option<f64>,
+    stage: &UsdStage,
+) -> Result<UsdCurves> {
     let token = |name: &str, fallback: &str| -> Result<String> {
         let rep = file.attribute(prim, name).and_then(|a| file.field(a, "default"));
         rep.map_or(Ok(fallback.to_owned()), |r| file.text(r))
@@ -280,7 +294,8 @@ fn read_columns(file: &mut CrateFile, prim: Node, path: &str, frame: Option<f64>
     };
     let mut notes = vec![];
     if kind != "linear" && basis != "catmullRom" {
-        notes.push(format!("the basis is {basis}: the points are control points, the curve does not pass through them"));
+        notes
+            .push(format!("the basis is {basis}: the points are control points, the curve does not pass through them"));
     }
     if kind != "linear" && basis == "catmullRom" && wrap == "nonperiodic" {
         notes.push("the curves are not pinned: they are drawn from their second to their last but one point".into());
