@@ -11,14 +11,14 @@ use std::sync::LazyLock;
 /// Where the chest is cut, cm.
 const FLOOR: f64 = -20.0;
 
-/// The grid that the bust is polygonised on: finest over the face.
+/// The grid that the half x >= 0 (and a little beyond) is polygonised on: finest over the face.
 fn grid() -> Grid {
     Grid {
         centre: v(0.0, 8.8, 5.0),
         inner: 5.5,
         cell: 0.33,
         growth: 0.055,
-        bounds: [v(-23.0, FLOOR - 1.5, -15.0), v(23.0, 25.0, 13.0)],
+        bounds: [v(-1.0, FLOOR - 1.5, -15.0), v(23.0, 25.0, 13.0)],
     }
 }
 

@@ -138,7 +138,7 @@ pub fn crossings(mesh: &Mesh) -> usize {
     let n = 48;
     let cell = |x: f64, i: usize| (((x - lo[i]) / widest * n as f64) as usize).min(n - 1);
     let mut bin: Vec<Vec<u32>> = vec![Vec::new(); n * n * n];
-    let mut cells_of = |t: u32, out: &mut Vec<Vec<u32>>| {
+    let cells_of = |t: u32, out: &mut Vec<Vec<u32>>| {
         let c = mesh.corners(t);
         let r: [_; 3] = std::array::from_fn(|i| {
             let (a, b) = c.iter().fold((f64::MAX, f64::MIN), |(l, h), p| (l.min(p[i]), h.max(p[i])));

@@ -89,7 +89,7 @@ fn normals(mesh: &Mesh) -> Vec<Vec3> {
 }
 
 /// Fills texels next to filled ones with the mean of those, [`SPREAD`] times.
-fn spread<const N: usize>(texel: &mut Vec<[f32; N]>, mut filled: Vec<bool>, size: usize) {
+fn spread<const N: usize>(texel: &mut [[f32; N]], mut filled: Vec<bool>, size: usize) {
     for _ in 0..SPREAD {
         let new: Vec<Option<[f32; N]>> = (0..texel.len())
             .into_par_iter()
