@@ -173,7 +173,7 @@ fn turn_upright(position: &[Vec3], uv: &mut [[f64; 2]], up: Vec3) {
         let h = p.dot(&up) - height;
         (0..2).for_each(|c| d[c] += h * (q[c] - mean[c]));
     }
-    let norm = d[0].hypot(d[1]).max(1e-12);
+    let norm = libm::hypot(d[0], d[1]).max(1e-12);
     let (s, c) = (d[0] / norm, d[1] / norm);
     uv.iter_mut().for_each(|p| *p = [c * p[0] - s * p[1], s * p[0] + c * p[1]]);
 }
