@@ -257,6 +257,9 @@ pub fn render(
             }
             order.sort_unstable();
             for &key in order.iter() {
+                if tile.full() {
+                    break;
+                }
                 let i = key as u32 as usize;
                 let (a, b) = (&points[i], &points[i + 1]);
                 let size = 1.0 / view.scale(f64::from(a.z.min(b.z))) as f32;

@@ -118,9 +118,9 @@ impl Slabs {
             return 0.0;
         }
         let z = (z - LIFT).clamp(0.0, n - 1e-3);
-        let (k, fz) = (z as usize, z - z.floor());
+        let (k, fz) = split(z);
         let (x, y) = ((x - 0.5).clamp(0.0, n - 1.001), (y - 0.5).clamp(0.0, n - 1.001));
-        let (i, j, fx, fy) = (x as usize, y as usize, x - x.floor(), y - y.floor());
+        let ((i, fx), (j, fy)) = (split(x), split(y));
         let at = |i: usize, j: usize| {
             let c = (j * CELLS + i) * (CELLS + 1) + k;
             sum[c] + (sum[c + 1] - sum[c]) * fz
@@ -139,12 +139,19 @@ impl Slabs {
             return 1.0;
         }
         let (x, y) = ((x - 0.5).clamp(0.0, n - 1.001), (y - 0.5).clamp(0.0, n - 1.001));
-        let (i, j, fx, fy) = (x as usize, y as usize, x - x.floor(), y - y.floor());
+        let ((i, fx), (j, fy)) = (split(x), split(y));
         let lit = |i: usize, j: usize| 1.0 - ((z - depth[j * TEXELS + i]) / SKIN_BIAS - 1.0).clamp(0.0, 1.0);
         let low = lit(i, j) * (1.0 - fx) + lit(i + 1, j) * fx;
         let high = lit(i, j + 1) * (1.0 - fx) + lit(i + 1, j + 1) * fx;
         low * (1.0 - fy) + high * fy
     }
+}
+
+/// Whole and broken part of a number in [0, 2^31).
+#[inline]
+fn split(x: f32) -> (usize, f32) {
+    let i = x as i32;
+    (i as usize, x - i as f32)
 }
 
 /// Optical depth (opacity times covered part of a cell's cross-section) of all hairs, summed down each column.
