@@ -104,12 +104,13 @@ fn rotation(axis: u8, degrees: f64) -> Matrix {
 
 /// The rotation of a quaternion with imaginary part `v` and real part `r`, of any length but zero.
 fn from_quaternion(v: [f64; 3], r: f64) -> Option<Matrix> {
-    let mut n = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] + r * r).sqrt();
-    // USD takes quaternions as they are; one that is a unit but for rounding is taken so too, to agree with it.
-    if (n - 1.0).abs() < 1e-5 {
-        n = 1.0;
-    }
-    let ([x, y, z], r) = (v.map(|c| c / n), r / n);
+    let n = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] + r * r).sqrt();
+    // USD takes the angle from the real part alone. Where rounding is all that keeps it from a unit, so is it here,
+    // to agree with USD; between two samples it is far from one.
+    let r = if (n - 1.0).abs() < 1e-5 { r.clamp(-1.0, 1.0) } else { r / n };
+    let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+    let scale = if length > 0.0 { (1.0 - r * r).max(0.0).sqrt() / length } else { 0.0 };
+    let [x, y, z] = v.map(|c| c * scale);
     let rows = [
         [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * r), 2.0 * (x * z - y * r), 0.0],
         [2.0 * (x * y - z * r), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + x * r), 0.0],
