@@ -23,7 +23,8 @@ struct Chart {
     extent: [f64; 2],
 }
 
-/// Space between charts and to the border of the texture square: 10 texels of a 512 map.
+/// Space between charts and to the border of the texture square: 10 texels of a 512 map. With less, charts bleed into each
+/// other on small maps; with more, texels are wasted.
 const GAP: f64 = 0.02;
 
 /// Mirrors the half `position`, `triangle` (x >= 0, the border at x = 0) and lays it out. `part_of` names the part of a
@@ -193,7 +194,7 @@ impl Chart {
 /// first; a chart goes on the first shelf with room.
 fn shelves(charts: &[Chart], order: &[usize], scale: f64) -> Option<Vec<[f64; 2]>> {
     let mut corner = vec![[0.0; 2]; charts.len()];
-    // (bottom, height, next u, and the next free v above the charts of each column is not tracked: shelves are plain)
+    // Bottom, height, next free u.
     let mut shelf: Vec<[f64; 3]> = Vec::new();
     let mut top = GAP;
     for &k in order {

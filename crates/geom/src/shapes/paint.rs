@@ -4,7 +4,7 @@ use crate::{Map, Mesh, NONE, Vec3};
 use rayon::prelude::*;
 
 /// Rounds of spreading outward from the charts, texels: bilinear samples and one level of shrinking at a chart's border
-/// read painted values only.
+/// read painted values only. Below 8 a map shrunk eightfold would mix in zeros; above, neighbouring charts meet anyway.
 const SPREAD: usize = 12;
 
 /// A one-channel map of `size` by `size` texels. Texel centres covered by a chart get `f(position, unit smooth normal)`;
