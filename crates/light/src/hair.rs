@@ -136,7 +136,7 @@ impl Draw<'_> {
         let lights = self.lighting.columns();
         scratch.depth.clear();
         for k in knot.iter() {
-            self.lighting.depths(k.p, &mut scratch.depth);
+            self.lighting.depths(k.p, V3::zeros(), &mut scratch.depth);
         }
         let (color, opacity) = (layer.color(s), layer.opacity(s));
         if opacity <= 0.0 {

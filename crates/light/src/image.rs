@@ -176,7 +176,7 @@ mod tests {
 
     #[test]
     fn numbers_are_drawn_inside_the_picture_only() {
-        let mut image = Image::filled(60, 30, [0.3; 3]);
+        let mut image = Image::filled(70, 30, [0.3; 3]);
         image.draw_number(-1007, 2);
         let light = image.rgb.iter().filter(|c| c[0] == 0.9).count();
         // Dots of '-', '1', '0', '0', '7' at 2 x 2 pixels each.

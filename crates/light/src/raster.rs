@@ -17,7 +17,7 @@ const SAMPLE: [[f64; 2]; 4] = [[0.375, 0.125], [0.875, 0.375], [0.125, 0.625], [
 const SIGMA: f32 = 0.52;
 
 /// Where the filter ends, pixels: a whole number of table steps.
-pub(crate) const REACH: f32 = 1.625;
+pub(crate) const REACH: f32 = 1.5;
 
 /// Steps of the table per pixel.
 const STEPS: usize = 128;
@@ -53,7 +53,7 @@ impl Filter {
     #[inline]
     fn upto(&self, x: f32) -> f32 {
         let x = (x.clamp(-REACH, REACH) + REACH) * STEPS as f32;
-        let i = x as usize;
+        let i = x as i32 as usize;
         let (a, b) = (self.table[i], self.table[i + 1]);
         a + (b - a) * (x - i as f32)
     }
@@ -223,36 +223,30 @@ impl Tile {
         }
     }
 
-    /// The finished colours, row by row. `skin` gives the colour of triangle at a pixel position and depth.
+    /// The finished colours, row by row. `skin` gives the colour of a triangle at a pixel position and depth.
     pub fn resolve(&self, background: [f32; 3], skin: impl Fn(u32, [f64; 2], f32) -> V3) -> Vec<[f32; 3]> {
-        let behind = V3::from(background);
-        let finish = |k: usize| {
-            let p = &self.pixel[k];
-            let mut rgb = V3::from(p.rgb);
+        let finish = |(k, p): (usize, &Pixel)| {
             let seen = self.triangle.get(k).copied().unwrap_or([NOBODY; 4]);
             if seen == [NOBODY; 4] && p.through == [1.0; 4] {
                 return background;
             }
-            let mut known = [behind; 4];
-            for s in 0..4 {
-                if seen[s] != NOBODY && p.through[s] >= OPAQUE {
-                    let same = (0..s).find(|&r| seen[r] == seen[s] && p.through[r] >= OPAQUE);
-                    known[s] = same.map_or_else(
-                        || {
-                            let x = (self.x0 + k % self.width) as f64 + SAMPLE[s][0];
-                            let y = (self.y0 + k / self.width) as f64 + SAMPLE[s][1];
-                            skin(seen[s], [x, y], p.depth[s])
-                        },
-                        |r| known[r],
-                    );
+            let mut rgb = V3::from(p.rgb);
+            // The last triangle and its colour: samples of one triangle share one.
+            let mut known = (NOBODY, V3::from(background));
+            for ((&triangle, &through), (&depth, at)) in seen.iter().zip(&p.through).zip(p.depth.iter().zip(&SAMPLE)) {
+                if triangle == NOBODY {
+                    rgb += V3::from(background) * (0.25 * through);
+                } else if through >= OPAQUE {
+                    if known.0 != triangle {
+                        let (x, y) = (self.x0 + k % self.width, self.y0 + k / self.width);
+                        known = (triangle, skin(triangle, [x as f64 + at[0], y as f64 + at[1]], depth));
+                    }
+                    rgb += known.1 * (0.25 * through);
                 }
-            }
-            for s in 0..4 {
-                rgb += known[s] * (0.25 * p.through[s]);
             }
             rgb.into()
         };
-        (0..self.pixel.len()).map(finish).collect()
+        self.pixel.iter().enumerate().map(finish).collect()
     }
 }
 
@@ -276,8 +270,8 @@ impl Pixel {
             samples += open;
         }
         self.covered += 0.25 * alpha * samples;
-        for c in 0..3 {
-            self.rgb[c] += 0.25 * seen * rgb[c];
+        for (sum, c) in self.rgb.iter_mut().zip(rgb) {
+            *sum += 0.25 * seen * c;
         }
         let t = self.through;
         t[0].max(t[1]).max(t[2].max(t[3]))

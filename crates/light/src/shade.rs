@@ -18,9 +18,9 @@ pub fn studio_lights(camera: &Camera) -> Vec<Light> {
     let light =
         |x: f64, y: f64, z: f64, color| Light { direction: (axis[0] * x + axis[1] * y + axis[2] * z).into(), color };
     vec![
-        light(0.55, 0.75, 0.75, [1.75, 1.62, 1.45]),
+        light(0.55, 0.75, 0.75, [1.75, 1.64, 1.50]),
         light(-0.8, 0.1, 0.75, [0.34, 0.40, 0.50]),
-        light(-0.55, 0.75, -0.8, [1.15, 1.22, 1.35]),
+        light(-0.55, 0.75, -0.8, [1.0, 1.06, 1.18]),
     ]
 }
 
@@ -53,15 +53,15 @@ pub struct HairShade {
 impl Default for HairShade {
     fn default() -> Self {
         HairShade {
-            diffuse: 0.62,
-            specular: 0.16,
+            diffuse: 0.5,
+            specular: 0.14,
             exponent: 60,
             shift_deg: 7.0,
-            glint: 0.55,
+            glint: 0.45,
             glint_exponent: 16,
             glint_shift_deg: 9.0,
             through: 0.6,
-            skin_normal: 0.5,
+            skin_normal: 0.8,
         }
     }
 }
