@@ -71,7 +71,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings { hair: HairShade::default(), ambient: [0.17, 0.18, 0.20], shadow: 0.9 }
+        Settings { hair: HairShade::default(), ambient: [0.14, 0.15, 0.165], shadow: 0.9 }
     }
 }
 

@@ -18,9 +18,9 @@ pub fn studio_lights(camera: &Camera) -> Vec<Light> {
     let light =
         |x: f64, y: f64, z: f64, color| Light { direction: (axis[0] * x + axis[1] * y + axis[2] * z).into(), color };
     vec![
-        light(0.55, 0.75, 0.75, [1.75, 1.64, 1.50]),
-        light(-0.8, 0.1, 0.75, [0.34, 0.40, 0.50]),
-        light(-0.55, 0.75, -0.8, [1.0, 1.06, 1.18]),
+        light(0.55, 0.75, 0.75, [1.30, 1.22, 1.12]),
+        light(-0.8, 0.1, 0.75, [0.26, 0.30, 0.38]),
+        light(-0.55, 0.75, -0.8, [0.80, 0.85, 0.94]),
     ]
 }
 
@@ -46,18 +46,18 @@ pub struct HairShade {
     /// rendering", the ratio of its transmission and reflection factors).
     pub through: f32,
     /// How much a hair that stands up takes the shading of the skin at its root, in [0, 1]: the production pipeline's
-    /// mixed normal (§4.1), which gives short fur the form of the body. Only with root normals.
+    /// mixed normal (§4.4), which gives short fur the form of the body. Only with root normals.
     pub skin_normal: f32,
 }
 
 impl Default for HairShade {
     fn default() -> Self {
         HairShade {
-            diffuse: 0.5,
-            specular: 0.14,
+            diffuse: 0.66,
+            specular: 0.19,
             exponent: 60,
             shift_deg: 7.0,
-            glint: 0.45,
+            glint: 0.6,
             glint_exponent: 16,
             glint_shift_deg: 9.0,
             through: 0.6,
