@@ -48,7 +48,7 @@ pub struct PushCounts {
     pub pushed: usize,
     /// Of these, hairs with a segment that had to leave the way to the normal, because the normal was blocked too.
     pub escaped: usize,
-    /// Hairs for which no direction was clear: rooted in a cavity smaller than themselves. They enter the skin still.
+    /// Hairs for which no direction was clear: they follow the directions that stay farthest out.
     pub uncleared: usize,
 }
 
@@ -57,12 +57,10 @@ pub struct PushCounts {
 pub fn push_up(skin: &Skin, bvh: &Bvh, settings: &PushUp, hairs: &mut ControlHairs) -> PushCounts {
     assert!(settings.step > 0.0 && settings.clearance > 0.0, "step and clearance of the push-up are positive");
     let (root, points) = (&hairs.root, hairs.points);
-    let odd = skin.topology.counts;
-    let closed = odd.open_edges == 0 && odd.non_manifold_edges == 0;
     let lift = |(h, local): (usize, &mut [[f32; 3]])| {
         let frame = skin.frame(&root[h]);
         let line = world_points(&frame, local);
-        let job = Job { skin, bvh, settings, normal: frame.n, closed };
+        let job = Job { skin, bvh, settings, normal: frame.n };
         let (line, counts) = job.clear(line);
         if counts.pushed > 0 {
             for (out, p) in local.iter_mut().zip(&line) {
@@ -86,16 +84,13 @@ struct Job<'a> {
     settings: &'a PushUp,
     /// Normal at the root.
     normal: Vec3,
-    /// True if the sign of the distance changes at the surface only: then nothing within the distance of a point outside
-    /// is inside. Behind an open border it changes in mid-air.
-    closed: bool,
 }
 
 /// How a segment fares.
 #[derive(Clone, Copy)]
 enum Fit {
     Clear,
-    /// By how much it misses its clearance at a sample that does.
+    /// By how much it misses its clearance at the first sample that does.
     Misses(f64),
 }
 
@@ -135,8 +130,6 @@ impl Job<'_> {
             }
             let d = v / length;
             let turned = match self.fit(at, d, length, before, SLACK) {
-                // Past a dead end the rest is carried along as it is.
-                _ if counts.uncleared > 0 => d,
                 Fit::Clear => d,
                 Fit::Misses(_) => {
                     counts.pushed = 1;
@@ -186,30 +179,20 @@ impl Job<'_> {
     fn fit(&self, from: Vec3, d: Vec3, length: f64, before: f64, share: f64) -> Fit {
         let PushUp { step, clearance } = *self.settings;
         let ramp = RAMP * clearance;
-        // Signed distance at arc length `s` of the segment, and by how much it misses what is needed there.
-        let probe = |s: f64| {
-            let need = clearance * ((before + s) / ramp).min(1.0) * share;
-            self.bvh.closest(from + d * s, f64::INFINITY).map(|c| (c.signed_distance, need - c.signed_distance))
-        };
-        // The end first: most segments that miss do so there.
-        let Some((_, by)) = probe(length) else { return Fit::Clear };
-        if by > 0.0 {
-            return Fit::Misses(by);
-        }
-        let (mut s, mut sure) = (0.0, 0.0);
-        loop {
+        let mut s = 0.0;
+        let mut sure = 0.0;
+        while s < length {
             // Nothing nearer than `sure` can be too near; on the ramp samples stay close.
             let fine = if before + s < ramp { (0.25 * step).min(0.05 * ramp) } else { step.min(2.0 * clearance) };
-            s += fine.max(sure);
-            if s >= length {
-                return Fit::Clear;
+            s = (s + fine.max(sure)).min(length);
+            let Some(hit) = self.bvh.closest(from + d * s, f64::INFINITY) else { return Fit::Clear };
+            let need = clearance * ((before + s) / ramp).min(1.0) * share;
+            if hit.signed_distance < need {
+                return Fit::Misses(need - hit.signed_distance);
             }
-            let Some((distance, by)) = probe(s) else { return Fit::Clear };
-            if by > 0.0 {
-                return Fit::Misses(by);
-            }
-            sure = if self.closed { distance - clearance } else { 0.0 };
+            sure = hit.signed_distance - clearance;
         }
+        Fit::Clear
     }
 }
 

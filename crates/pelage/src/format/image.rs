@@ -85,6 +85,15 @@ pub fn write_png(path: &Path, w: usize, h: usize, rgb8: &[u8]) -> Result<(), For
     encode_png(path, w, h, rgb8, 3, image::ExtendedColorType::Rgb8)
 }
 
+/// An 8-bit PNG of 1 (grey) or 3 (RGB) channels, top row first, in memory.
+pub fn png_bytes(w: usize, h: usize, channels: usize, bytes: &[u8]) -> Vec<u8> {
+    let kind = if channels == 1 { image::ExtendedColorType::L8 } else { image::ExtendedColorType::Rgb8 };
+    let mut out = Vec::new();
+    let encoder = image::codecs::png::PngEncoder::new(&mut out);
+    encoder.write_image(bytes, w as u32, h as u32, kind).expect("sizes fit and memory does not fail");
+    out
+}
+
 /// Writes 16-bit grey, `w * h` texels, top row first.
 pub fn write_png_gray16(path: &Path, w: usize, h: usize, gray: &[u16]) -> Result<(), FormatError> {
     encode_png(path, w, h, bytemuck::cast_slice(gray), 2, image::ExtendedColorType::L16)

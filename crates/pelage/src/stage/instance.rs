@@ -2,14 +2,15 @@
 
 use super::run::{Counts, Runner};
 use super::tables::{decode, encode, id_columns, ids_of, root_columns, roots_of, table, vector_columns, vectors_of};
-use super::{What, candidate_density, groom, layer_seed};
+use super::{Skin, What, candidate_density, groom, layer_seed};
 use crate::Error;
 use crate::config::{Feature, MapRef};
 use crate::format::ply::Column;
 use pelage_geom::{TiledMap, rng};
 use pelage_groom::candidates::{Candidates, candidates as find_candidates};
-use pelage_groom::instance::{Density, Roots, color_column, feature_column, grow, weigh};
-use pelage_groom::triangulate::triangulate;
+use pelage_groom::instance::{Density, Feature as FeatureSource, Roots, colour_column, feature_column};
+use pelage_groom::instance::{roots as find_roots, weights as find_weights};
+use pelage_groom::triangulate::{mirrored_charts, triangulate};
 
 /// Blue-noise candidate roots of a layer.
 pub fn candidates(run: &mut Runner<'_>, i: usize) -> Result<Candidates, Error> {
@@ -27,13 +28,16 @@ pub fn candidates(run: &mut Runner<'_>, i: usize) -> Result<Candidates, Error> {
         let what = format!("layer {} asks for {count} candidate roots, more than 2^32", layer.name);
         return Err(Error::input(what, "lower density.value, or check shot.meters_per_unit"));
     }
-    let found = find_candidates(&skin.mesh, u64::from(layer_seed(&layer.name)), count, &mut |_| true)
-        .expect("nothing stops the search");
+    let found = search(&skin, layer_seed(&layer.name), count);
     let file = encode("candidate roots in blue-noise order: a prefix is as even as the whole", &[
         table("candidate", root_columns(&found.root)),
     ]);
     run.keep(what, Counts::from([("candidates".to_owned(), found.root.len() as u64)]), &[("data.ply", &file)])?;
     Ok(found)
+}
+
+fn search(skin: &Skin, seed: u32, count: usize) -> Candidates {
+    find_candidates(&skin.mesh, u64::from(seed), count, &mut |_| true).expect("nothing stops the search")
 }
 
 /// Roots of a layer's hairs: the candidates whose rank is below the local density.
@@ -43,7 +47,7 @@ pub fn roots(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
         return Ok(found);
     }
     let skin = groom::skin(run)?;
-    let candidates = candidates(run, i)?;
+    let mut candidates = candidates(run, i)?;
     let layer = &run.project.groom.value.layer[i];
     let map = feature_map(run, &layer.density)?;
     let on_off = layer.on_off.as_ref().map(|m| run.map(m)).transpose()?;
@@ -52,7 +56,13 @@ pub fn roots(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
         map: map.as_ref(),
         on_off: on_off.as_ref(),
     };
-    let found = grow(&skin.mesh, &skin.topology, &candidates, &density, layer_seed(&layer.name));
+    let seed = layer_seed(&layer.name);
+    let needed = density.needed_candidates(skin.area());
+    if needed > candidates.root.len() {
+        run.warnings.push(format!("layer {}: the density map exceeds 1; candidates beyond the cached ones", layer.name));
+        candidates = search(&skin, seed, needed);
+    }
+    let found = find_roots(&skin.mesh, &skin.topology, &candidates, &density, seed);
     let counts = Counts::from([
         ("hairs".to_owned(), found.id.len() as u64),
         (format!("hairs in layer {}", layer.name), found.id.len() as u64),
@@ -91,12 +101,20 @@ pub fn weights(run: &mut Runner<'_>, i: usize) -> Result<Weights, Error> {
     let skin = groom::skin(run)?;
     let sites = groom::placed(run)?;
     let roots = roots(run, i)?;
-    let triangulation = triangulate(&sites, &skin.topology);
-    let found = weigh(&triangulation, &roots);
-    let counts = Counts::from([
-        ("hairs outside the control triangulation".to_owned(), found.outside as u64),
-        ("control edges that could not be kept".to_owned(), triangulation.counts.skipped_edges as u64),
-    ]);
+    let triangulation = triangulate(&sites, &mirrored_charts(&skin.mesh, &skin.topology));
+    let found = find_weights(&roots, &triangulation);
+    let c = triangulation.counts;
+    let counts = Counts::from(
+        [
+            ("hairs outside the control triangulation", found.outside),
+            ("hairs in charts without control hairs", found.orphans),
+            ("control sites at the place of another", c.duplicates),
+            ("control edges left out because they cross", c.crossing),
+            ("charts with an open outline", c.open_outlines),
+            ("control corners without a side of the parting", c.no_side),
+        ]
+        .map(|(name, n)| (name.to_owned(), n as u64)),
+    );
     let index: [Vec<u32>; 3] = std::array::from_fn(|k| found.hair.iter().map(|h| h[k]).collect());
     let names = ["a", "b", "c"];
     let mut columns: Vec<(&str, Column)> = names.into_iter().zip(index.map(Column::U32)).collect();
@@ -133,7 +151,13 @@ pub fn column(run: &mut Runner<'_>, what: What, i: usize) -> Result<Vec<f32>, Er
     }
     let roots = roots(run, i)?;
     let map = feature_map(run, &feature)?;
-    let values = feature_column(&roots, feature.value, map.as_ref(), feature.noise, rng::channel(name));
+    let source = FeatureSource {
+        value: feature.value as f32,
+        map: map.as_ref(),
+        noise: feature.noise as f32,
+        channel: rng::channel(name),
+    };
+    let values = feature_column(&roots, &source, u64::from(layer_seed(&layer.name)));
     let file = encode(&format!("{name} of every hair"), &[table("hair", vec![(name, Column::F32(values.clone()))])]);
     run.keep(what, Counts::new(), &[("data.ply", &file)])?;
     Ok(values)
@@ -150,7 +174,9 @@ pub fn color(run: &mut Runner<'_>, i: usize) -> Result<Vec<[f32; 3]>, Error> {
     let color = &run.project.groom.value.layer[i].color;
     let map = color.map.clone().map(|map| MapRef { map, channel: Default::default(), wrap: color.wrap });
     let map = map.map(|m| super::skin::read_map(&run.project.maps[&m.map], &m, true)).transpose()?;
-    let values = color_column(&roots, color.value, map.as_ref(), color.noise);
+    let value = color.value.map(|x| x as f32);
+    let seed = u64::from(layer_seed(&run.project.groom.value.layer[i].name));
+    let values = colour_column(&roots, value, map.as_ref(), color.noise as f32, rng::channel("color"), seed);
     let file = encode("linear colour of every hair", &[table("hair", vector_columns(["r", "g", "b"], &values))]);
     run.keep(what, Counts::new(), &[("data.ply", &file)])?;
     Ok(values)
