@@ -241,10 +241,10 @@ fn influence(distance: f64, radius: f64, falloff: f64) -> f64 {
         return 1.0;
     }
     let inner = radius * (1.0 - falloff.clamp(0.0, 1.0));
-    if distance <= inner {
-        1.0
-    } else if distance >= radius {
+    if distance >= radius {
         0.0
+    } else if distance <= inner {
+        1.0
     } else {
         let t = (radius - distance) / (radius - inner);
         t * t * (3.0 - 2.0 * t)

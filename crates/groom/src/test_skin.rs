@@ -35,6 +35,7 @@ impl TestSkin {
                 let uv =
                     |i: f64, j: usize| [(i / nu as f64 * 0.75 + shift) as f32, 1.0 - (j as f64 / nv as f64) as f32];
                 let (x, y) = (i as f64, (i + 1) as f64);
+                let pole = if i < nu / 2 { 0.25 * nu as f64 } else { 0.75 * nu as f64 };
                 // Seen from outside, longitude runs to the right and latitude index down.
                 let mut add = |t: [u32; 3], c: [[f32; 2]; 3]| {
                     mesh.triangle.push(t);
@@ -42,14 +43,14 @@ impl TestSkin {
                     mesh.face.push((j * nu + i) as u32);
                 };
                 if j > 0 {
-                    let middle = if j + 1 == nv { 0.5 * (x + y) } else { y };
+                    let middle = if j + 1 == nv { pole } else { y };
                     add(
                         [vertex(i, j), vertex(i + 1, j + 1), vertex(i + 1, j)],
                         [uv(x, j), uv(middle, j + 1), uv(y, j)],
                     );
                 }
                 if j + 1 < nv {
-                    let middle = if j == 0 { 0.5 * (x + y) } else { x };
+                    let middle = if j == 0 { pole } else { x };
                     add(
                         [vertex(i, j), vertex(i, j + 1), vertex(i + 1, j + 1)],
                         [uv(middle, j), uv(x, j + 1), uv(y, j + 1)],
