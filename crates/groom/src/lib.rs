@@ -1,13 +1,17 @@
 //! Hair without time: control hairs placed and combed, hairs instanced from maps, weights, interpolation.
 
+mod area_curve;
+mod box_tree;
+pub mod candidates;
+mod chart_cut;
 pub mod comb;
 pub mod control;
+pub mod instance;
 pub mod interpolate;
 pub mod parting;
 pub mod place;
+mod point_grid;
 pub mod push_up;
 #[cfg(test)]
 mod test_skin;
-mod area_curve;
-pub mod candidates;
-mod point_grid;
+pub mod triangulate;
