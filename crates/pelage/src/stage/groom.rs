@@ -95,7 +95,7 @@ fn place_hairs(run: &mut Runner<'_>) -> Result<(ControlHairs, Sites, Counts), Er
     let root: Vec<SurfacePoint> = match p.per_cm2 {
         Some(_) => {
             let count = (per_unit2 * skin.area()).round() as usize;
-            candidates(&skin.mesh, CONTROL_SEED, count, &mut |_| true).map(|c| c.root).unwrap_or_default()
+            candidates(&skin.mesh, &skin.topology, CONTROL_SEED, count, &mut |_| true).map(|c| c.root).unwrap_or_default()
         }
         None => Vec::new(),
     };

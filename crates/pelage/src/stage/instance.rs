@@ -37,7 +37,7 @@ pub fn candidates(run: &mut Runner<'_>, i: usize) -> Result<Candidates, Error> {
 }
 
 fn search(skin: &Skin, seed: u32, count: usize) -> Candidates {
-    find_candidates(&skin.mesh, u64::from(seed), count, &mut |_| true).expect("nothing stops the search")
+    find_candidates(&skin.mesh, &skin.topology, u64::from(seed), count, &mut |_| true).expect("nothing stops the search")
 }
 
 /// Roots of a layer's hairs: the candidates whose rank is below the local density.
