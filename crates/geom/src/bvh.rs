@@ -19,8 +19,9 @@ const STACK: usize = SAH_DEPTH + 40;
 const PARALLEL: usize = 16_384;
 
 /// A triangle is a line when its height is at most this fraction of its longest side; its closest point is then sought
-/// on its sides, off by no more than that. Below 1e-14 its plane is rounding noise; above 1e-6 the error would show.
-const LINE: f64 = 1e-10;
+/// on its sides, off by no more than that. Above it that error grows; below it the rounding of its plane does, as
+/// 1e-16 over the height.
+const LINE: f64 = 1e-8;
 
 /// The point of a mesh closest to a query.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -137,7 +138,8 @@ impl Bvh {
         let mut stack = [Waiting::default(); STACK];
         let mut depth = 0;
         let mut node = self.root?.waiting(|n| n.square_distance(&query));
-        if !(node.far <= reach) {
+        // Max and min pass over NaN, so that it would come near everything.
+        if node.far > reach || query.iter().chain([&limit]).any(|x| x.is_nan()) {
             return None;
         }
         loop {
@@ -187,7 +189,7 @@ impl Bvh {
         let mut stack = [Waiting::default(); STACK];
         let mut depth = 0;
         let mut node = self.root?.waiting(|n| n.enter(&origin, &inverse));
-        if !(node.far <= reach) {
+        if node.far > reach || origin.iter().chain(&direction).chain([&max_t]).any(|x| x.is_nan()) {
             return None;
         }
         loop {
@@ -514,11 +516,18 @@ fn closest_on_triangle(q: &Vec3, corner: [Vec3; 3]) -> Hit {
     let (d00, d01, d11) = (ab.dot(&ab), ab.dot(&ac), ac.dot(&ac));
     let (d20, d21) = (aq.dot(&ab), aq.dot(&ac));
     // Square of twice the area; weights of the foot of the perpendicular times that.
-    let area = d00 * d11 - d01 * d01;
-    let (v, w) = (d11 * d20 - d01 * d21, d00 * d21 - d01 * d20);
-    let u = area - v - w;
+    let mut area = d00 * d11 - d01 * d01;
+    let (mut v, mut w) = (d11 * d20 - d01 * d21, d00 * d21 - d01 * d20);
     let longest = d00.max(d11).max(d00 + d11 - 2.0 * d01);
-    let line = !(area > 1e-9 * longest * longest) && ab.cross(&ac).norm() <= LINE * longest;
+    let mut line = false;
+    if area <= 1e-6 * longest * longest {
+        // A sliver: the differences above lose what cross products keep.
+        let n = ab.cross(&ac);
+        area = n.norm_squared();
+        (v, w) = (n.dot(&aq.cross(&ac)), n.dot(&ab.cross(&aq)));
+        line = area <= LINE * LINE * longest * longest;
+    }
+    let u = area - v - w;
     if !line && u > 0.0 && v > 0.0 && w > 0.0 {
         let weight = [v / area, w / area];
         let position = a + ab * weight[0] + ac * weight[1];
@@ -545,7 +554,7 @@ fn closest_on_edge(q: &Vec3, corner: [Vec3; 3], i: usize) -> Hit {
     let side = corner[to] - corner[from];
     let along = side.dot(&(q - corner[from]));
     let square = side.norm_squared();
-    let (position, feature, t) = if !(along > 0.0) {
+    let (position, feature, t) = if along <= 0.0 {
         (corner[from], Feature::Corner(from), 0.0)
     } else if along >= square {
         (corner[to], Feature::Corner(to), 0.0)
@@ -585,7 +594,7 @@ struct Shear {
 impl Shear {
     fn new(origin: Vec3, direction: Vec3) -> Option<Self> {
         let z = direction.iamax();
-        if !(direction[z].abs() > 0.0) {
+        if direction[z] == 0.0 {
             return None;
         }
         let axis = [(z + 1) % 3, (z + 2) % 3, z];

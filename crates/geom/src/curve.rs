@@ -28,7 +28,8 @@ pub fn resample(points: &[Vec3], n: usize) -> Vec<Vec3> {
     let (mut below, mut beyond) = (-total, overshoot(points, total, high, steps, &mut Vec::new()));
     let mut opening = high;
     let mut laid = Vec::with_capacity(n);
-    // Regula falsi, Illinois variant: the end that stays put counts half.
+    // Regula falsi, Illinois variant: an end that stays put twice counts half.
+    let mut last_moved_low = None;
     for _ in 0..60 {
         let guess = if beyond > 0.0 { (low * beyond - high * below) / (beyond - below) } else { high };
         opening = if guess > low && guess <= high { guess } else { 0.5 * (low + high) };
@@ -36,10 +37,14 @@ pub fn resample(points: &[Vec3], n: usize) -> Vec<Vec3> {
         if off.abs() <= 1e-12 * total {
             break;
         }
+        let again = last_moved_low == Some(off < 0.0);
+        last_moved_low = Some(off < 0.0);
         if off < 0.0 {
-            (low, below, beyond) = (opening, off, 0.5 * beyond);
+            (low, below) = (opening, off);
+            beyond *= if again { 0.5 } else { 1.0 };
         } else {
-            (high, beyond, below) = (opening, off, 0.5 * below);
+            (high, beyond) = (opening, off);
+            below *= if again { 0.5 } else { 1.0 };
         }
     }
     laid.truncate(steps);
