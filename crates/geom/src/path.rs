@@ -11,6 +11,18 @@ const ON_PLANE: f64 = 1e-12;
 /// A corner with no more weight than this does not count: what single-precision barycentric coordinates leave.
 const NO_WEIGHT: f64 = 2.5e-7;
 
+/// Cosine and sine of the angles by which planes are turned: multiples of 22.5 degrees, either way round.
+const TURNS: [[f64; 2]; 8] = [
+    [1.0, 0.0],
+    [0.923_879_532_511_286_7, 0.382_683_432_365_089_8],
+    [0.923_879_532_511_286_7, -0.382_683_432_365_089_8],
+    [std::f64::consts::FRAC_1_SQRT_2, std::f64::consts::FRAC_1_SQRT_2],
+    [std::f64::consts::FRAC_1_SQRT_2, -std::f64::consts::FRAC_1_SQRT_2],
+    [0.382_683_432_365_089_8, 0.923_879_532_511_286_7],
+    [0.382_683_432_365_089_8, -0.923_879_532_511_286_7],
+    [0.0, 1.0],
+];
+
 /// A point of a path, in the triangle that the path comes from and in the one that it goes on in. Inside a triangle
 /// both are the same; on an edge they are the same place seen from both sides, and where the edge is a seam they know
 /// the texture coordinates of both charts.
@@ -24,8 +36,9 @@ pub struct PathPoint {
 
 /// Path from one point of the rest mesh to another along its section with the plane through both that contains the
 /// mean of the normals there: start, every edge crossed (exactly on the edge), end. Of the two ways round a closed
-/// section it is the shorter. `None` if neither way arrives: the section leaves over an open edge or belongs to
-/// another part of the mesh.
+/// section it is the shorter. Where neither way arrives (the section leaves over an open edge, or runs through a fold or
+/// another part of the mesh) planes turned about the line between the points are tried, the least turned first; `None`
+/// if no plane arrives.
 pub fn straight_path(mesh: &Mesh, topology: &Topology, from: SurfacePoint, to: SurfacePoint) -> Option<Vec<PathPoint>> {
     let inner = |p: SurfacePoint| PathPoint { before: p, after: p };
     if from.triangle == to.triangle {
@@ -38,19 +51,22 @@ pub fn straight_path(mesh: &Mesh, topology: &Topology, from: SurfacePoint, to: S
         }
     }
     let plane = Plane::new(mesh, topology, &from, &to);
-    let mut best: Option<(f64, Vec<PathPoint>)> = None;
-    // A vertex on the plane counts as above it in the first round, below it in the second, so that the plane passes
-    // through no vertex and cuts each triangle in two edges or none.
-    for zero_is_above in [true, false] {
-        let cut = Cut { mesh, topology, plane: &plane, zero_is_above };
-        for &start in starts.iter().filter(|s| cut.crosses(s.triangle)) {
-            for edge in (0..3).filter(|&e| cut.crosses_edge(start.triangle, e)) {
-                let limit = best.as_ref().map_or(f64::INFINITY, |b| b.0 * (1.0 - 1e-9));
-                best = cut.walk(from, to, start, edge, &ends, limit).or(best);
+    TURNS.iter().find_map(|turn| {
+        let plane = plane.turned(mesh.point(&to), *turn);
+        // A vertex on the plane counts as above it in the first round, below it in the second, so that the plane
+        // passes through no vertex and cuts each triangle in two edges or none.
+        let mut best: Option<(f64, Vec<PathPoint>)> = None;
+        for zero_is_above in [true, false] {
+            let cut = Cut { mesh, topology, plane: &plane, zero_is_above };
+            for &start in starts.iter().filter(|s| cut.crosses(s.triangle)) {
+                for edge in (0..3).filter(|&e| cut.crosses_edge(start.triangle, e)) {
+                    let limit = best.as_ref().map_or(f64::INFINITY, |b| b.0 * (1.0 - 1e-9));
+                    best = cut.walk(from, to, start, edge, &ends, limit).or(best);
+                }
             }
         }
-    }
-    best.map(|b| b.1)
+        best.map(|b| b.1)
+    })
 }
 
 /// Path over the points of the rest mesh closest to `points` (scene units), straight from each to the next; `bvh` is
@@ -119,6 +135,13 @@ impl Plane {
         let (low, high) = mesh.bounds();
         let extent = (Vec3::from(high) - Vec3::from(low)).norm() + a.amax();
         Plane { origin: a, normal, on: ON_PLANE * extent }
+    }
+
+    /// Turned about the line from its origin to `to`.
+    fn turned(&self, to: Vec3, [cos, sin]: [f64; 2]) -> Self {
+        let axis = (to - self.origin).try_normalize(0.0).unwrap_or_default();
+        let normal = self.normal * cos + axis.cross(&self.normal) * sin;
+        Plane { normal: if normal.norm() > 0.0 { normal } else { self.normal }, ..*self }
     }
 
     /// Distance, scene units; 0 if it is next to nothing.
