@@ -106,28 +106,6 @@ fn by_arc_length(points: &[Vec3], total: f64, n: usize) -> Vec<Vec3> {
     out
 }
 
-/// Smooth curve through the points: uniform Catmull-Rom cubics (Catmull, Rom 1974), the missing neighbours of the ends
-/// being the mirror images of the inner ones. `per_segment` points from each given point on (at least 1), and the last.
-pub fn catmull_rom(points: &[Vec3], per_segment: usize) -> Vec<Vec3> {
-    let Some(&last) = points.last() else { return Vec::new() };
-    let per_segment = per_segment.max(1);
-    let count = points.len();
-    let mut out = Vec::with_capacity((count - 1) * per_segment + 1);
-    for i in 0..count - 1 {
-        let (b, c) = (points[i], points[i + 1]);
-        let a = if i > 0 { points[i - 1] } else { b * 2.0 - c };
-        let d = if i + 2 < count { points[i + 2] } else { c * 2.0 - b };
-        for k in 0..per_segment {
-            let t = k as f64 / per_segment as f64;
-            let (m0, m1) = ((c - a) * 0.5, (d - b) * 0.5);
-            let (e, f) = (c - b - m0, m1 - m0);
-            out.push(b + (m0 + (e * 3.0 - f + (f - e * 2.0) * t) * t) * t);
-        }
-    }
-    out.push(last);
-    out
-}
-
 /// Closest point of a polyline: segment, parameter along it in [0, 1], position, distance. Ties go to the first
 /// segment. A single point is segment 0 at 0; no point is infinitely far.
 pub fn closest_on_polyline(points: &[Vec3], q: Vec3) -> (usize, f64, Vec3, f64) {
@@ -210,25 +188,6 @@ mod tests {
         assert_eq!(resample(&[Vec3::x(); 4], 3), vec![Vec3::x(); 3]);
         assert!(resample(&helix(5, 1.0), 0).is_empty());
         assert_eq!(resample(&helix(5, 1.0), 1).len(), 1);
-    }
-
-    #[test]
-    fn catmull_rom_passes_through_its_points_and_keeps_lines() {
-        let points = helix(6, 1.0);
-        let out = catmull_rom(&points, 4);
-        assert_eq!(out.len(), 21);
-        for (k, p) in points.iter().enumerate() {
-            assert!((out[4 * k] - p).norm() < 1e-12);
-        }
-        // Slopes agree on both sides of an inner point.
-        let fine = catmull_rom(&points, 1000);
-        let (a, b) = (fine[2000] - fine[1999], fine[2001] - fine[2000]);
-        assert!((a - b).norm() < 0.01 * a.norm());
-        for (k, p) in catmull_rom(&[Vec3::zeros(), Vec3::x(), Vec3::x() * 2.0], 3).iter().enumerate() {
-            assert!((p - Vec3::x() * (k as f64 / 3.0)).norm() < 1e-12);
-        }
-        assert_eq!(catmull_rom(&[Vec3::y()], 3), vec![Vec3::y()]);
-        assert!(catmull_rom(&[], 3).is_empty());
     }
 
     #[test]

@@ -8,7 +8,6 @@ pub mod curve;
 pub mod map;
 pub mod mesh;
 pub mod motion;
-pub mod path;
 pub mod pose;
 pub mod rng;
 pub mod shapes;

@@ -10,6 +10,7 @@
 //! leaves the root as it is and bends the tip.
 
 use crate::control::{ControlHairs, Skin, to_local, to_world, vec3};
+use pelage_geom::curve::closest_on_polyline;
 use pelage_geom::{Frame, TiledMap, Vec3};
 use rayon::prelude::*;
 
@@ -161,21 +162,8 @@ pub fn side_of(line: &[Vec3], at: Vec3, n: Vec3) -> i8 {
 /// without length.
 fn nearest(line: &[Vec3], at: Vec3) -> Option<(Vec3, Vec3)> {
     let direction = |i: usize| (line[i + 1] - line[i]).try_normalize(0.0);
-    let mut best: Option<(f64, usize, f64, Vec3)> = None;
-    for i in 0..line.len().saturating_sub(1) {
-        let v = line[i + 1] - line[i];
-        if v.norm_squared() == 0.0 {
-            continue;
-        }
-        let f = ((at - line[i]).dot(&v) / v.norm_squared()).clamp(0.0, 1.0);
-        let p = line[i] + v * f;
-        let d = (at - p).norm_squared();
-        if best.is_none_or(|b| d < b.0) {
-            best = Some((d, i, f, p));
-        }
-    }
-    let (_, i, f, p) = best?;
-    let here = direction(i)?;
+    let (i, f, p, _) = closest_on_polyline(line, at);
+    let here = (i..line.len().saturating_sub(1)).find_map(direction).or_else(|| (0..i).rev().find_map(direction))?;
     let before = (0..i).rev().find_map(direction).unwrap_or(here);
     let after = (i + 1..line.len() - 1).find_map(direction).unwrap_or(here);
     let corner = |a: Vec3, b: Vec3| (a + b).try_normalize(1e-6).unwrap_or(here);

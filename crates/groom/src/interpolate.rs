@@ -9,6 +9,7 @@
 //! again before it is scaled. A hair's length is then exactly what its map says.
 
 use crate::control::{ControlHairs, to_world, vec3};
+use pelage_geom::curve::resample;
 use pelage_geom::{Mesh, Pose, SurfacePoint, Topology, Vec3};
 use rayon::prelude::*;
 
@@ -79,7 +80,7 @@ impl ControlPose {
     }
 
     /// From control hairs as world polylines: hair `h` is `position[h * from..][..from]`. With `points` other than
-    /// `from`, each is first resampled to `points` points at equal arc length.
+    /// `from`, each is first resampled to `points` points with equal segments.
     pub fn from_polylines(position: &[Vec3], from: usize, points: usize) -> Self {
         assert!(from >= 2 && points >= 2, "a hair has at least two points");
         let lanes = lanes_for(points - 1);
@@ -150,25 +151,6 @@ fn directions(line: &[Vec3], lanes: usize, unit: &mut [f32]) -> usize {
     let spare = segments..segments.next_multiple_of(lanes);
     spare.for_each(|s| unit[slot(lanes, s)] = 1.0);
     degenerate
-}
-
-/// A polyline at `points` points of equal arc length, ends kept.
-pub(crate) fn resample(line: &[Vec3], points: usize) -> Vec<Vec3> {
-    let total: f64 = line.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
-    let mut out = Vec::with_capacity(points);
-    let (mut s, mut before) = (0, 0.0);
-    for k in 0..points {
-        let at = total * k as f64 / (points - 1) as f64;
-        let mut here = (line[s + 1] - line[s]).norm();
-        while s + 2 < line.len() && before + here < at {
-            before += here;
-            s += 1;
-            here = (line[s + 1] - line[s]).norm();
-        }
-        let f = if here > 0.0 { ((at - before) / here).clamp(0.0, 1.0) } else { 0.0 };
-        out.push(line[s] + (line[s + 1] - line[s]) * f);
-    }
-    out
 }
 
 /// Roots on the skin of a pose, scene units relative to `origin`; computed in double precision.
@@ -486,13 +468,7 @@ mod tests {
     }
 
     #[test]
-    fn resampling_keeps_ends_and_spaces_points_evenly_along_the_line() {
-        let line = [Vec3::zeros(), Vec3::new(3.0, 0.0, 0.0), Vec3::new(3.0, 1.0, 0.0)];
-        let r = resample(&line, 5);
-        assert_eq!(
-            r,
-            [0.0, 1.0, 2.0, 3.0].map(|x| Vec3::new(x, 0.0, 0.0)).into_iter().chain([line[2]]).collect::<Vec<_>>()
-        );
+    fn segments_without_length_take_a_neighbours_direction() {
         let still = ControlPose::from_polylines(
             &[Vec3::x(), Vec3::x(), Vec3::new(1.0, 2.0, 0.0), Vec3::new(1.0, 2.0, 0.0)],
             4,

@@ -6,8 +6,8 @@
 
 use crate::comb::side_of;
 use crate::control::{ControlHairs, Sites, Skin, to_local, vec3};
-use crate::interpolate::resample;
 use crate::parting::{PartingCounts, add_partings};
+use pelage_geom::curve::resample;
 use pelage_geom::{Bvh, NONE, Strands, SurfacePoint, TiledMap, Vec3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;

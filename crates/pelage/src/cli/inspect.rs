@@ -137,7 +137,7 @@ fn describe_mesh(read: &ply::ReadMesh) -> Value {
 fn describe_curves(file: &CurveFile) -> Value {
     let layer = |l: &curves::CurveSet| {
         let s = &l.strands;
-        let length = |i: usize| polyline_length(s.points(i));
+        let length = |i: usize| pelage_geom::curve::length(s.points(i));
         let mut low = [f64::INFINITY; 3];
         let mut high = [f64::NEG_INFINITY; 3];
         for p in &s.position {
@@ -207,9 +207,4 @@ fn inspect_motion(file: &Path) -> Result<Value, Error> {
         "displacement (m)": spread(reach),
         "rotation (degrees)": spread(turn),
     }))
-}
-
-fn polyline_length(points: &[[f32; 3]]) -> f64 {
-    let square = |w: &[[f32; 3]]| (0..3).map(|x| (f64::from(w[1][x]) - f64::from(w[0][x])).powi(2)).sum::<f64>();
-    points.windows(2).map(|w| square(w).sqrt()).sum()
 }
