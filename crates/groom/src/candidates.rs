@@ -13,7 +13,7 @@
 
 use crate::area_curve::AreaCurve;
 use crate::point_grid::PointGrid;
-use pelage_geom::{Mesh, SurfacePoint, StrandId, Vec3, rng};
+use pelage_geom::{Mesh, NONE, StrandId, SurfacePoint, Topology, Vec3, rng};
 use rayon::prelude::*;
 
 /// Points that a stretch holds when it is new; it is halved at twice as many. At 1 each new point is forced into the
@@ -27,6 +27,14 @@ const DARTS: usize = 16;
 const PARTS: usize = 4;
 /// Rounds over fewer stretches than this run in one part.
 const SMALL: usize = 256;
+/// Distance between the points that stand for an open edge, in spacings. Wider, darts slip between them; narrower costs
+/// time and memory on long borders.
+const RIM_STEP: f64 = 0.25;
+/// How far an open edge keeps points away: a dart at distance b counts as sqrt(this) * b from a neighbour. Without it
+/// the best darts of a border are those right on it, where nothing is beyond, and hairs line up along the edge (twice
+/// the density within an eighth of the spacing); at 4 an edge repels like a mirror and leaves a bare strip. Here the strip
+/// of half a spacing has 1.07 times the density of the rest.
+const RIM_WEIGHT: f32 = 16.0;
 /// Stretches a thread takes at a time.
 const CHUNK: usize = 256;
 
@@ -54,12 +62,7 @@ pub fn strand_id(layer_seed: u32, index: u32) -> StrandId {
 /// The first `count` candidates of a rest mesh. Triangles without area carry none; a mesh without area has none at
 /// all. `progress` hears of the candidates found so far and stops the work by returning false (then the result is
 /// `None`).
-pub fn candidates(
-    mesh: &Mesh,
-    seed: u64,
-    count: usize,
-    progress: &mut dyn FnMut(usize) -> bool,
-) -> Option<Candidates> {
+pub fn candidates(mesh: &Mesh, seed: u64, count: usize, progress: &mut dyn FnMut(usize) -> bool) -> Option<Candidates> {
     let curve = AreaCurve::new(mesh);
     let area = curve.area();
     if area == 0.0 {
@@ -67,7 +70,16 @@ pub fn candidates(
     }
     let (low, high) = mesh.bounds();
     let centre = 0.5 * (Vec3::from(low) + Vec3::from(high));
-    let mut sampler = Sampler { curve, seed, centre, grid: PointGrid::new(), at: Vec::new(), root: Vec::new() };
+    let mut sampler = Sampler {
+        rim: open_edges(mesh),
+        curve,
+        seed,
+        centre,
+        grid: PointGrid::new(),
+        rim_grid: PointGrid::new(),
+        at: Vec::new(),
+        root: Vec::new(),
+    };
     let mut level = 0u32;
     while sampler.root.len() < count {
         if !sampler.level(level, count, progress) {
@@ -96,6 +108,10 @@ struct Sampler<'a> {
     /// Origin of single-precision positions.
     centre: Vec3,
     grid: PointGrid,
+    /// Ends of the skin's open edges and the normals of their triangles.
+    rim: Vec<[Vec3; 3]>,
+    /// Points along the open edges, a part of the spacing apart.
+    rim_grid: PointGrid,
     /// Position on the curve of every point, in the order of the grid.
     at: Vec<f64>,
     /// Roots by rank.
@@ -109,6 +125,7 @@ impl Sampler<'_> {
         // Cubes as wide as the spacing at the beginning of the level: no hole is wider, and few points share a cube.
         let spacing = (self.curve.area() / (FILL * stretches) as f64).sqrt();
         self.grid.resize(spacing as f32, 2 * FILL * stretches);
+        self.line_rim(spacing);
         let mut held = vec![[0u8; 2]; stretches];
         for &t in &self.at {
             let h = self.half(t, stretches);
@@ -127,6 +144,29 @@ impl Sampler<'_> {
             }
         }
         true
+    }
+
+    /// Points along the open edges for a level of the given spacing.
+    fn line_rim(&mut self, spacing: f64) {
+        self.rim_grid = PointGrid::new();
+        let steps = |e: &[Vec3; 3]| ((e[1] - e[0]).norm() / (RIM_STEP * spacing)).ceil().max(1.0) as usize;
+        self.rim_grid.resize(spacing as f32, self.rim.iter().map(steps).sum());
+        for e in &self.rim {
+            let n = steps(e);
+            for k in 0..n {
+                let p = e[0] + (e[1] - e[0]) * ((k as f64 + 0.5) / n as f64) - self.centre;
+                self.rim_grid.push(single(p), single(e[2]));
+            }
+        }
+    }
+
+    /// Squared distance of a dart from the nearest earlier point; less near an open edge, beyond which there are none.
+    fn room(&self, position: [f32; 3], normal: [f32; 3], enough: f32) -> f32 {
+        let d = self.grid.nearest(position, normal, enough, 0);
+        if d <= enough || self.rim.is_empty() {
+            return d;
+        }
+        d.min(RIM_WEIGHT * self.rim_grid.nearest(position, normal, enough / RIM_WEIGHT, 0))
     }
 
     /// The half stretch (twice the number of the stretch, plus one for its second half) that `t` lies in.
@@ -173,8 +213,7 @@ impl Sampler<'_> {
         let entries = self.curve.entries(low, low + length);
         let grain = half / FILL as f64;
         let turn = u64::from(held[0] + held[1]);
-        let key =
-            rng::key(self.seed, (stretches + s) as u64, rng::channel("candidate dart").wrapping_add(turn));
+        let key = rng::key(self.seed, (stretches + s) as u64, rng::channel("candidate dart").wrapping_add(turn));
         let mut best: Option<Pick> = None;
         let mut normal_of = (usize::MAX, [0.0; 3]);
         for dart in 0..DARTS as u64 {
@@ -182,19 +221,35 @@ impl Sampler<'_> {
             let unit = |bits: u64| (bits >> 32) as f64 * (1.0 / 4_294_967_296.0);
             let at = low + (dart as f64 + unit(a)) / DARTS as f64 * length;
             let place = self.curve.place(at, entries.clone(), grain, [unit(b), unit(b << 32)]);
-            let position = std::array::from_fn(|i| (place.position[i] - self.centre[i]) as f32);
+            let position = single(place.position - self.centre);
             if normal_of.0 != place.entry {
-                let n = self.curve.normal(place.entry);
-                normal_of = (place.entry, std::array::from_fn(|i| n[i] as f32));
+                normal_of = (place.entry, single(self.curve.normal(place.entry)));
             }
             let enough = best.as_ref().map_or(-1.0, |p| p.distance2);
-            let distance2 = self.grid.nearest(position, normal_of.1, enough, 0);
+            let distance2 = self.room(position, normal_of.1, enough);
             if distance2 > enough {
                 best = Some(Pick { root: place.root, at, position, normal: normal_of.1, distance2 });
             }
         }
         best.expect("at least one dart")
     }
+}
+
+fn single(v: Vec3) -> [f32; 3] {
+    [v.x as f32, v.y as f32, v.z as f32]
+}
+
+/// Both ends of every open edge of a triangle with area, and that triangle's normal.
+fn open_edges(mesh: &Mesh) -> Vec<[Vec3; 3]> {
+    let mut rim = Vec::new();
+    for (t, across) in Topology::new(mesh).neighbour.iter().enumerate() {
+        let c = mesh.corners(t as u32);
+        let normal = (c[1] - c[0]).cross(&(c[2] - c[0]));
+        if normal.norm() > 0.0 {
+            rim.extend((0..3).filter(|&i| across[i] == NONE).map(|i| [c[i], c[(i + 1) % 3], normal.normalize()]));
+        }
+    }
+    rim
 }
 
 /// The lowest `bits` bits of `x` in reverse.
