@@ -19,8 +19,9 @@ const STACK: usize = SAH_DEPTH + 40;
 const PARALLEL: usize = 16_384;
 
 /// A triangle is a line when its height is at most this fraction of its longest side; its closest point is then sought
-/// on its sides, off by no more than that. Below 1e-14 its plane is rounding noise; above 1e-6 the error would show.
-const LINE: f64 = 1e-10;
+/// on its sides, off by no more than that. Above it that error grows; below it the rounding of its plane does, as
+/// 1e-16 over the height.
+const LINE: f64 = 1e-8;
 
 /// The point of a mesh closest to a query.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,14 +41,15 @@ pub struct Closest {
 /// Hierarchy over the triangles of one pose. Triangles with a coordinate that is not finite are left out.
 #[derive(Clone, Debug, Default)]
 pub struct Bvh {
-    /// Depth first: the left child of node k is k + 1.
-    node: Vec<Node>,
+    root: Option<Node>,
+    pair: Vec<Pair>,
     /// Triangles in the order of the leaves: index, vertices, places of the neighbours in this order.
     index: Vec<u32>,
     triangle: Vec<[u32; 3]>,
     neighbour: Vec<[u32; 3]>,
     /// Triangles with two corners welded together; they lose ties, since they know no neighbours.
     collapsed: Vec<bool>,
+    /// Vertices in the order in which the leaves first use them: a leaf reads neighbouring memory.
     position: Vec<[f64; 3]>,
     /// Angle-weighted unit normal of each vertex, the same for all that are welded; zero where there is none.
     vertex_normal: Vec<[f32; 3]>,
@@ -55,8 +57,13 @@ pub struct Bvh {
     open: Vec<bool>,
 }
 
-/// Box of single precision that surely holds its triangles. A leaf has `count` > 0 triangles from `start`; an inner
-/// node has its right child `start` nodes further on.
+/// Two children, side by side in one cache line.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct Pair([Node; 2]);
+
+/// Box of single precision that surely holds its triangles. A leaf has `count` > 0 triangles from `start`; the
+/// children of an inner node are pair `start`.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     low: [f32; 3],
@@ -101,25 +108,24 @@ impl Bvh {
             .enumerate()
             .filter_map(|(t, tri)| Item::new(t as u32, tri.map(|v| position[v as usize])))
             .collect();
-        let mut node = Vec::new();
-        if !item.is_empty() {
-            node.reserve(item.len());
-            build(&mut item, 0, 0, &mut node);
-        }
+        let mut pair = Vec::with_capacity(item.len() / 2);
+        let root = (!item.is_empty()).then(|| build(&mut item, 0, 0, &mut pair));
         let index: Vec<u32> = item.iter().map(|i| i.triangle).collect();
         let mut place = vec![NONE; triangle.len()];
         for (k, &t) in index.iter().enumerate() {
             place[t as usize] = k as u32;
         }
         let at = |t: u32| if t == NONE { NONE } else { place[t as usize] };
-        let (vertex_normal, open) = vertex_normals(position, triangle, topology);
+        let (order, renumbered) = by_first_use(&index, triangle, position.len());
+        let (vertex_normal, open) = vertex_normals(position, triangle, &order, topology);
         Bvh {
-            node,
-            triangle: index.par_iter().map(|&t| triangle[t as usize]).collect(),
+            root,
+            pair,
             neighbour: index.par_iter().map(|&t| topology.neighbour[t as usize].map(at)).collect(),
             collapsed: index.par_iter().map(|&t| is_collapsed(topology, t)).collect(),
+            position: order.par_iter().map(|&v| position[v as usize]).collect(),
             index,
-            position: position.to_vec(),
+            triangle: renumbered,
             vertex_normal,
             open,
         }
@@ -129,14 +135,14 @@ impl Bvh {
     pub fn closest(&self, query: Vec3, limit: f64) -> Option<Closest> {
         let mut best: Option<(usize, Hit)> = None;
         let mut reach = limit * limit;
-        let mut stack = [(0u32, 0.0f64); STACK];
+        let mut stack = [Waiting::default(); STACK];
         let mut depth = 0;
-        let mut k = 0;
-        if self.node.is_empty() || !(self.node[0].square_distance(&query) <= reach) {
+        let mut node = self.root?.waiting(|n| n.square_distance(&query));
+        // Max and min pass over NaN, so that it would come near everything.
+        if node.far > reach || query.iter().chain([&limit]).any(|x| x.is_nan()) {
             return None;
         }
         loop {
-            let node = &self.node[k];
             if node.count > 0 {
                 for slot in node.start as usize..(node.start + node.count) as usize {
                     let hit = closest_on_triangle(&query, corners(&self.position, self.triangle[slot]));
@@ -148,15 +154,13 @@ impl Bvh {
                     }
                 }
             } else {
-                let (left, right) = (k + 1, k + node.start as usize);
-                let (dl, dr) = (self.node[left].square_distance(&query), self.node[right].square_distance(&query));
-                let (near, dn, far, df) = if dl <= dr { (left, dl, right, dr) } else { (right, dr, left, dl) };
-                if dn <= reach {
-                    if df <= reach {
-                        stack[depth] = (far as u32, df);
+                let (near, next) = self.pair[node.start as usize].order(|n| n.square_distance(&query));
+                if near.far <= reach {
+                    if next.far <= reach {
+                        stack[depth] = next;
                         depth += 1;
                     }
-                    k = near;
+                    node = near;
                     continue;
                 }
             }
@@ -165,8 +169,8 @@ impl Bvh {
                     return best.map(|(slot, hit)| self.signed(query, slot, &hit));
                 }
                 depth -= 1;
-                if stack[depth].1 <= reach {
-                    k = stack[depth].0 as usize;
+                if stack[depth].far <= reach {
+                    node = stack[depth];
                     break;
                 }
             }
@@ -180,15 +184,15 @@ impl Bvh {
         let shear = Shear::new(origin, direction)?;
         let inverse = direction.map(|d| 1.0 / d);
         let mut best: Option<(usize, [f64; 2])> = None;
-        let mut reach = max_t;
-        let mut stack = [(0u32, 0.0f64); STACK];
+        // Finite, so that a box that is missed (infinite) is never within reach.
+        let mut reach = max_t.min(f64::MAX);
+        let mut stack = [Waiting::default(); STACK];
         let mut depth = 0;
-        let mut k = 0;
-        if self.node.is_empty() || !(self.node[0].enter(&origin, &inverse) <= reach) {
+        let mut node = self.root?.waiting(|n| n.enter(&origin, &inverse));
+        if node.far > reach || origin.iter().chain(&direction).chain([&max_t]).any(|x| x.is_nan()) {
             return None;
         }
         loop {
-            let node = &self.node[k];
             if node.count > 0 {
                 for slot in node.start as usize..(node.start + node.count) as usize {
                     let Some((t, weight)) = shear.hit(corners(&self.position, self.triangle[slot])) else { continue };
@@ -198,15 +202,13 @@ impl Bvh {
                     }
                 }
             } else {
-                let (left, right) = (k + 1, k + node.start as usize);
-                let (tl, tr) = (self.node[left].enter(&origin, &inverse), self.node[right].enter(&origin, &inverse));
-                let (near, tn, far, tf) = if tl <= tr { (left, tl, right, tr) } else { (right, tr, left, tl) };
-                if tn <= reach {
-                    if tf <= reach {
-                        stack[depth] = (far as u32, tf);
+                let (near, next) = self.pair[node.start as usize].order(|n| n.enter(&origin, &inverse));
+                if near.far <= reach {
+                    if next.far <= reach {
+                        stack[depth] = next;
                         depth += 1;
                     }
-                    k = near;
+                    node = near;
                     continue;
                 }
             }
@@ -215,8 +217,8 @@ impl Bvh {
                     return best.map(|(slot, weight)| (reach, surface_point(self.index[slot], weight)));
                 }
                 depth -= 1;
-                if stack[depth].1 <= reach {
-                    k = stack[depth].0 as usize;
+                if stack[depth].far <= reach {
+                    node = stack[depth];
                     break;
                 }
             }
@@ -311,34 +313,45 @@ impl Bounds {
     }
 }
 
-/// Appends the subtree over `item`, whose first element has place `start` among all.
-fn build(item: &mut [Item], start: usize, depth: usize, out: &mut Vec<Node>) {
+/// Node over `item`, whose first element has place `start` among all; what is below it is appended.
+fn build(item: &mut [Item], start: usize, depth: usize, out: &mut Vec<Pair>) -> Node {
     let (mut all, mut centres) = (Bounds::EMPTY, Bounds::EMPTY);
     for i in item.iter() {
         all.add(&i.low, &i.high);
         let c = [i.centre(0), i.centre(1), i.centre(2)];
         centres.add(&c, &c);
     }
-    let me = out.len();
-    out.push(Node { low: all.low, high: all.high, start: start as u32, count: item.len() as u32 });
+    let mut node = Node { low: all.low, high: all.high, start: start as u32, count: item.len() as u32 };
     if item.len() <= LEAF {
-        return;
+        return node;
     }
     let middle = split(item, &centres, depth);
+    node.start = out.len() as u32;
+    node.count = 0;
+    out.push(Pair([node; 2]));
+    let parallel = item.len() > PARALLEL;
     let (left, right) = item.split_at_mut(middle);
-    let right_start = start + middle;
-    if left.len() + right.len() > PARALLEL {
-        let (mut l, mut r) = (Vec::new(), Vec::new());
-        rayon::join(|| build(left, start, depth + 1, &mut l), || build(right, right_start, depth + 1, &mut r));
-        out.append(&mut l);
-        out[me].start = (out.len() - me) as u32;
-        out.append(&mut r);
+    let children = if parallel {
+        let half = |item: &mut [Item], start: usize| {
+            let mut below = Vec::with_capacity(item.len() / 2);
+            (build(item, start, depth + 1, &mut below), below)
+        };
+        let (l, r) = rayon::join(|| half(left, start), || half(right, start + middle));
+        [l, r].map(|(mut child, below)| {
+            let shift = out.len() as u32;
+            let moved = |n: &mut Node| n.start += if n.count == 0 { shift } else { 0 };
+            moved(&mut child);
+            out.extend(below.into_iter().map(|mut p| {
+                p.0.iter_mut().for_each(moved);
+                p
+            }));
+            child
+        })
     } else {
-        build(left, start, depth + 1, out);
-        out[me].start = (out.len() - me) as u32;
-        build(right, right_start, depth + 1, out);
-    }
-    out[me].count = 0;
+        [build(left, start, depth + 1, out), build(right, start + middle, depth + 1, out)]
+    };
+    out[node.start as usize] = Pair(children);
+    node
 }
 
 /// Parts a range in two by the binned surface-area heuristic along the longest side of its centres, or in halves where
@@ -394,7 +407,27 @@ fn split(item: &mut [Item], centres: &Bounds, depth: usize) -> usize {
     i
 }
 
+/// A node still to be looked into.
+#[derive(Clone, Copy, Default)]
+struct Waiting {
+    far: f64,
+    start: u32,
+    count: u32,
+}
+
+impl Pair {
+    /// Both children, the nearer first (the left one if equal).
+    fn order(&self, distance: impl Fn(&Node) -> f64) -> (Waiting, Waiting) {
+        let [a, b] = self.0.map(|n| n.waiting(&distance));
+        if a.far <= b.far { (a, b) } else { (b, a) }
+    }
+}
+
 impl Node {
+    fn waiting(&self, distance: impl Fn(&Node) -> f64) -> Waiting {
+        Waiting { far: distance(self), start: self.start, count: self.count }
+    }
+
     /// Square distance from a point, 0 inside.
     fn square_distance(&self, q: &Vec3) -> f64 {
         let d = |i: usize| (f64::from(self.low[i]) - q[i]).max(q[i] - f64::from(self.high[i])).max(0.0);
@@ -431,11 +464,35 @@ fn face_normal([a, b, c]: [Vec3; 3]) -> Vec3 {
     if norm > LINE * longest { n / norm } else { Vec3::zeros() }
 }
 
-/// Angle-weighted normals of all vertices, and which lie on an open edge.
-fn vertex_normals(position: &[[f64; 3]], triangle: &[[u32; 3]], topology: &Topology) -> (Vec<[f32; 3]>, Vec<bool>) {
-    let of = |v: usize| {
+/// Vertices in the order in which the triangles, taken in the order of `index`, first use them; and those triangles
+/// over the vertices so numbered.
+fn by_first_use(index: &[u32], triangle: &[[u32; 3]], vertices: usize) -> (Vec<u32>, Vec<[u32; 3]>) {
+    let mut number = vec![NONE; vertices];
+    let mut order = Vec::with_capacity(vertices);
+    let renumbered = index.iter().map(|&t| {
+        triangle[t as usize].map(|v| {
+            let n = &mut number[v as usize];
+            if *n == NONE {
+                *n = order.len() as u32;
+                order.push(v);
+            }
+            *n
+        })
+    });
+    let renumbered = renumbered.collect();
+    (order, renumbered)
+}
+
+/// Angle-weighted normals of the vertices `order`, and which lie on an open edge.
+fn vertex_normals(
+    position: &[[f64; 3]],
+    triangle: &[[u32; 3]],
+    order: &[u32],
+    topology: &Topology,
+) -> (Vec<[f32; 3]>, Vec<bool>) {
+    let of = |&v: &u32| {
         let (mut sum, mut open) = (Vec3::zeros(), false);
-        for &c in topology.incident_welded(topology.weld[v]) {
+        for &c in topology.incident_welded(topology.weld[v as usize]) {
             let (t, i) = (c / 3, (c % 3) as usize);
             let corner = corners(position, triangle[t as usize]);
             let (a, b) = (corner[(i + 1) % 3] - corner[i], corner[(i + 2) % 3] - corner[i]);
@@ -449,7 +506,7 @@ fn vertex_normals(position: &[[f64; 3]], triangle: &[[u32; 3]], topology: &Topol
         let n = sum.try_normalize(1e-9).unwrap_or_default();
         ([n.x as f32, n.y as f32, n.z as f32], open)
     };
-    (0..position.len()).into_par_iter().map(of).unzip()
+    order.par_iter().map(of).unzip()
 }
 
 /// Closest point of a triangle.
@@ -459,11 +516,18 @@ fn closest_on_triangle(q: &Vec3, corner: [Vec3; 3]) -> Hit {
     let (d00, d01, d11) = (ab.dot(&ab), ab.dot(&ac), ac.dot(&ac));
     let (d20, d21) = (aq.dot(&ab), aq.dot(&ac));
     // Square of twice the area; weights of the foot of the perpendicular times that.
-    let area = d00 * d11 - d01 * d01;
-    let (v, w) = (d11 * d20 - d01 * d21, d00 * d21 - d01 * d20);
-    let u = area - v - w;
+    let mut area = d00 * d11 - d01 * d01;
+    let (mut v, mut w) = (d11 * d20 - d01 * d21, d00 * d21 - d01 * d20);
     let longest = d00.max(d11).max(d00 + d11 - 2.0 * d01);
-    let line = !(area > 1e-9 * longest * longest) && ab.cross(&ac).norm() <= LINE * longest;
+    let mut line = false;
+    if area <= 1e-6 * longest * longest {
+        // A sliver: the differences above lose what cross products keep.
+        let n = ab.cross(&ac);
+        area = n.norm_squared();
+        (v, w) = (n.dot(&aq.cross(&ac)), n.dot(&ab.cross(&aq)));
+        line = area <= LINE * LINE * longest * longest;
+    }
+    let u = area - v - w;
     if !line && u > 0.0 && v > 0.0 && w > 0.0 {
         let weight = [v / area, w / area];
         let position = a + ab * weight[0] + ac * weight[1];
@@ -490,7 +554,7 @@ fn closest_on_edge(q: &Vec3, corner: [Vec3; 3], i: usize) -> Hit {
     let side = corner[to] - corner[from];
     let along = side.dot(&(q - corner[from]));
     let square = side.norm_squared();
-    let (position, feature, t) = if !(along > 0.0) {
+    let (position, feature, t) = if along <= 0.0 {
         (corner[from], Feature::Corner(from), 0.0)
     } else if along >= square {
         (corner[to], Feature::Corner(to), 0.0)
@@ -530,7 +594,7 @@ struct Shear {
 impl Shear {
     fn new(origin: Vec3, direction: Vec3) -> Option<Self> {
         let z = direction.iamax();
-        if !(direction[z].abs() > 0.0) {
+        if direction[z] == 0.0 {
             return None;
         }
         let axis = [(z + 1) % 3, (z + 2) % 3, z];

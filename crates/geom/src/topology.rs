@@ -368,7 +368,7 @@ impl Shape {
         let largest = uv.iter().map(|p| p.amax()).fold(0.0, f64::max);
         // Written so that NaN coordinates are flat.
         let sign = if uv_twice.abs() > FLAT_UV * largest * uv_longest { uv_twice.signum() as i8 } else { 0 };
-        Shape { area: 0.5 * twice, zero_area: !(twice > FLAT * longest), uv_sign: sign }
+        Shape { area: 0.5 * twice, zero_area: twice <= FLAT * longest, uv_sign: sign }
     }
 }
 
@@ -378,8 +378,7 @@ fn find_charts(skin: &Welded, mate: &[[u32; 3]], links: &[[u32; 2]], shape: &[Sh
     let firm = |t: u32| shape[t as usize].uv_sign != 0 && distinct(skin.tri[t as usize]);
     let beside = |t: u32, found: &mut Vec<u32>| {
         found.clear();
-        for i in 0..3 {
-            let m = mate[t as usize][i];
+        for (i, &m) in mate[t as usize].iter().enumerate() {
             if m != NONE && skin.edge_uv(3 * t + i as u32) == skin.edge_uv(m) {
                 found.push(m / 3);
             }

@@ -63,14 +63,15 @@ fn main() {
     println!("{} threads", rayon::current_num_threads());
     for n in [20, 300] {
         let mesh = skin(n);
+        let topology = Topology::new(&mesh);
         best(&format!("1,000,000 candidates on {} triangles", mesh.triangle.len()), || {
-            candidates(&mesh, 1, 1_000_000, &mut |_| true)
+            candidates(&mesh, &topology, 1, 1_000_000, &mut |_| true)
         });
     }
     let mesh = skin(60);
     let topology = Topology::new(&mesh);
     let (density, length, width, opacity, colour) = (map(1, 0.9), map(1, 0.2), map(1, 0.2), map(1, 0.2), map(3, 0.2));
-    let all = candidates(&mesh, 1, 1_053_000, &mut |_| true).expect("not stopped");
+    let all = candidates(&mesh, &topology, 1, 1_053_000, &mut |_| true).expect("not stopped");
     let mut sites = Sites::default();
     for k in 0..2000u64 {
         let p = all.root[k as usize];

@@ -62,7 +62,13 @@ pub fn strand_id(layer_seed: u32, index: u32) -> StrandId {
 /// The first `count` candidates of a rest mesh. Triangles without area carry none; a mesh without area has none at
 /// all. `progress` hears of the candidates found so far and stops the work by returning false (then the result is
 /// `None`).
-pub fn candidates(mesh: &Mesh, seed: u64, count: usize, progress: &mut dyn FnMut(usize) -> bool) -> Option<Candidates> {
+pub fn candidates(
+    mesh: &Mesh,
+    topology: &Topology,
+    seed: u64,
+    count: usize,
+    progress: &mut dyn FnMut(usize) -> bool,
+) -> Option<Candidates> {
     let curve = AreaCurve::new(mesh);
     let area = curve.area();
     if area == 0.0 {
@@ -71,7 +77,7 @@ pub fn candidates(mesh: &Mesh, seed: u64, count: usize, progress: &mut dyn FnMut
     let (low, high) = mesh.bounds();
     let centre = 0.5 * (Vec3::from(low) + Vec3::from(high));
     let mut sampler = Sampler {
-        rim: open_edges(mesh),
+        rim: open_edges(mesh, topology),
         curve,
         seed,
         centre,
@@ -240,9 +246,9 @@ fn single(v: Vec3) -> [f32; 3] {
 }
 
 /// Both ends of every open edge of a triangle with area, and that triangle's normal.
-fn open_edges(mesh: &Mesh) -> Vec<[Vec3; 3]> {
+fn open_edges(mesh: &Mesh, topology: &Topology) -> Vec<[Vec3; 3]> {
     let mut rim = Vec::new();
-    for (t, across) in Topology::new(mesh).neighbour.iter().enumerate() {
+    for (t, across) in topology.neighbour.iter().enumerate() {
         let c = mesh.corners(t as u32);
         let normal = (c[1] - c[0]).cross(&(c[2] - c[0]));
         if normal.norm() > 0.0 {

@@ -50,7 +50,7 @@ fn sphere(n: usize) -> Mesh {
 }
 
 fn all(mesh: &Mesh, count: usize) -> Candidates {
-    candidates(mesh, 7, count, &mut |_| true).unwrap()
+    candidates(mesh, &Topology::new(mesh), 7, count, &mut |_| true).unwrap()
 }
 
 fn map(n: usize, f: impl Fn(f64, f64) -> f64) -> TiledMap {
@@ -126,13 +126,14 @@ fn asking_for_more_only_appends_whatever_the_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         assert_eq!(pool.install(|| all(&mesh, 9_000)), many);
     }
-    assert_ne!(candidates(&mesh, 8, 100, &mut |_| true).unwrap().root, many.root[..100]);
+    assert_ne!(candidates(&mesh, &Topology::new(&mesh), 8, 100, &mut |_| true).unwrap().root, many.root[..100]);
 }
 
 #[test]
 fn candidates_stop_when_told_and_need_area() {
     let mut calls = 0;
-    let stopped = candidates(&flat(3), 1, 100_000, &mut |n| {
+    let mesh = flat(3);
+    let stopped = candidates(&mesh, &Topology::new(&mesh), 1, 100_000, &mut |n| {
         calls += 1;
         n < 500
     });

@@ -7,10 +7,13 @@ use crate::{V3, View};
 
 /// Longest piece, pixels at its depth. Pieces are what is sorted by depth and what colours run over: longer ones cross
 /// in the wrong order and miss highlights, shorter ones cost time.
-const PIECE: f32 = 10.0;
+const PIECE: f32 = 16.0;
 
-/// Largest turn within a piece, radians. Larger shows corners in curls, smaller costs time.
-const TURN: f32 = 0.15;
+/// Largest distance between a curve and its pieces, pixels. Twice as much shows corners in curls.
+const SAG: f32 = 0.12;
+
+/// Largest turn within a piece, radians: so that highlights run smoothly over small curls.
+const TURN: f32 = 0.6;
 
 /// Most pieces between two points of a strand: bounds the work for hair that passes close to the eye.
 const MOST: usize = 64;
@@ -133,7 +136,7 @@ impl Draw<'_> {
         let lights = self.lighting.columns();
         scratch.depth.clear();
         for k in knot.iter() {
-            self.lighting.depths(k.p, &mut scratch.depth);
+            self.lighting.depths(k.p, V3::zeros(), &mut scratch.depth);
         }
         let (color, opacity) = (layer.color(s), layer.opacity(s));
         if opacity <= 0.0 {
@@ -239,8 +242,9 @@ impl Draw<'_> {
 fn pieces(a: &Knot, b: &Knot, h: f32) -> usize {
     let pixels = h * a.scale.max(b.scale);
     let turn = (b.m - a.m).norm();
-    let by_turn = (turn / TURN).min(pixels * 0.5);
-    let n = (pixels / PIECE).max(by_turn);
+    // A piece of length s that turns by t strays s t / 8 from its arc.
+    let by_sag = (pixels * turn * (0.125 / SAG)).sqrt();
+    let n = (pixels / PIECE).max(by_sag).max((turn / TURN).min(0.5 * pixels));
     if n < MOST as f32 { (n.ceil() as usize).max(1) } else { MOST }
 }
 

@@ -71,7 +71,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings { hair: HairShade::default(), ambient: [0.17, 0.18, 0.20], shadow: 0.55 }
+        Settings { hair: HairShade::default(), ambient: [0.14, 0.15, 0.165], shadow: 0.9 }
     }
 }
 
@@ -90,10 +90,10 @@ pub struct RenderCounts {
 
 /// Part of the light that a white hair passes on to those behind it. Light hair scatters forward: at 0 blond hair gets
 /// black shadows, at 1 white fur gets none.
-const SCATTER: f32 = 0.75;
+const SCATTER: f32 = 0.6;
 
 /// Part of the ambient light that reaches a place into which no light shines.
-const DEEP: f32 = 0.22;
+const DEEP: f32 = 0.15;
 
 /// Linear colour of hair without a colour.
 const BROWN: [f32; 3] = [0.16, 0.085, 0.042];
@@ -174,11 +174,12 @@ impl Lighting {
         2 * self.lights.len()
     }
 
-    /// Appends per light: optical depth of hair towards it, and the part of it that the skin lets through.
-    pub fn depths(&self, p: V3, out: &mut Vec<f32>) {
+    /// Appends per light: optical depth of hair towards it, and the part of it that the skin lets through. `normal` is
+    /// that of the skin at a point of the skin, else zero.
+    pub fn depths(&self, p: V3, normal: V3, out: &mut Vec<f32>) {
         for s in &self.slabs {
             out.push(self.settings.shadow * s.hair_depth(p));
-            out.push(s.skin_light(p));
+            out.push(s.skin_light(p, normal));
         }
     }
 
@@ -209,7 +210,7 @@ impl Lighting {
     fn skin(&self, p: V3, normal: V3, color: V3) -> V3 {
         let n = if normal.dot(&self.eye(p)) < 0.0 { -normal } else { normal };
         let mut depth = Vec::with_capacity(self.columns());
-        self.depths(p, &mut depth);
+        self.depths(p, n, &mut depth);
         let mut sum = V3::from(self.settings.ambient) * (self.ambient(&depth) * (0.75 + 0.25 * n.dot(&self.up)));
         for (light, d) in self.lights.iter().zip(depth.chunks_exact(2)) {
             sum += light.color * (n.dot(&light.to_light).max(0.0) * fade(d[0]) * d[1]);
@@ -257,6 +258,9 @@ pub fn render(
             }
             order.sort_unstable();
             for &key in order.iter() {
+                if tile.full() {
+                    break;
+                }
                 let i = key as u32 as usize;
                 let (a, b) = (&points[i], &points[i + 1]);
                 let size = 1.0 / view.scale(f64::from(a.z.min(b.z))) as f32;
@@ -282,8 +286,11 @@ fn assemble(drawn: &[Vec<[f32; 3]>], tiling: &Tiling) -> Image {
     image
 }
 
-/// For each tile a range of the second list, which holds what falls into the tiles, in the order of `pairs`.
-fn bin<T: Copy + Default>(tiles: usize, pairs: impl Iterator<Item = (u32, T)> + Clone) -> (Vec<usize>, Vec<T>) {
+/// What falls into each tile t: elements start[t] to start[t + 1] of the list.
+type Bins<T> = (Vec<usize>, Vec<T>);
+
+/// Sorts pairs of (tile, value) into tiles, in their order.
+fn bin<T: Copy + Default>(tiles: usize, pairs: impl Iterator<Item = (u32, T)> + Clone) -> Bins<T> {
     let mut start = vec![0usize; tiles + 1];
     for (t, _) in pairs.clone() {
         start[t as usize + 1] += 1;
@@ -302,8 +309,7 @@ fn bin<T: Copy + Default>(tiles: usize, pairs: impl Iterator<Item = (u32, T)> + 
 
 /// Points of all hairs in the picture, opacity per strand, and for each tile the keys of its pieces: depth in the upper
 /// half, first point in the lower. Keys are distinct, so sorting them gives one order only.
-#[allow(clippy::type_complexity, reason = "three lists that are used once")]
-fn lines(scene: &Scene, draw: &Draw, counts: &mut RenderCounts) -> (Vec<Point>, Vec<f32>, (Vec<usize>, Vec<u64>)) {
+fn lines(scene: &Scene, draw: &Draw, counts: &mut RenderCounts) -> (Vec<Point>, Vec<f32>, Bins<u64>) {
     let mut jobs: Vec<(&HairView, Range<usize>, usize)> = Vec::new();
     let mut opacity = Vec::with_capacity(counts.hairs);
     for layer in scene.layers {
@@ -338,12 +344,7 @@ fn lines(scene: &Scene, draw: &Draw, counts: &mut RenderCounts) -> (Vec<Point>, 
 }
 
 /// Triangles in the picture, cut at the near plane, and for each tile the list of those that touch it.
-fn facets(
-    scene: &Scene,
-    view: &View,
-    tiling: &Tiling,
-    counts: &mut RenderCounts,
-) -> (Vec<Facet>, (Vec<usize>, Vec<u32>)) {
+fn facets(scene: &Scene, view: &View, tiling: &Tiling, counts: &mut RenderCounts) -> (Vec<Facet>, Bins<u32>) {
     let mut facets = Vec::new();
     let mut pairs = Vec::new();
     for (t, corner) in scene.skin.iter().flat_map(|s| s.triangle.iter().map(|t| s.corners(t)).enumerate()) {
@@ -399,8 +400,8 @@ fn skin_color(scene: &Scene, view: &View, lighting: &Lighting, triangle: u32, at
     }
     let weight = |i: usize| (c[(i + 1) % 3] - p).cross(&(c[(i + 2) % 3] - p)).dot(&face) / area;
     let mut normal = Vec3::zeros();
-    for i in 0..3 {
-        if let Some(n) = skin.normal.get(vertex[i] as usize) {
+    for (i, &v) in vertex.iter().enumerate() {
+        if let Some(n) = skin.normal.get(v as usize) {
             normal += view.turn(Vec3::from(n.map(f64::from))) * weight(i).clamp(0.0, 1.0);
         }
     }

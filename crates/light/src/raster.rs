@@ -16,14 +16,15 @@ const SAMPLE: [[f64; 2]; 4] = [[0.375, 0.125], [0.875, 0.375], [0.125, 0.625], [
 /// thin line; 0.45 leaves 4 %, which shows as beads and moire, 0.7 is visibly soft.
 const SIGMA: f32 = 0.52;
 
-/// Where the filter ends, pixels.
-pub(crate) const REACH: f32 = 1.6;
+/// Where the filter ends, pixels: a whole number of table steps.
+pub(crate) const REACH: f32 = 1.5;
 
 /// Steps of the table per pixel.
 const STEPS: usize = 128;
 
-/// A pixel through which less light than this comes takes no more hairs: under half a step of 8 bits.
-const OPAQUE: f32 = 1.0 / 1024.0;
+/// A pixel through which less light than this comes takes no more hairs: what is so deep is dark, so the error is
+/// under half a step of 8 bits. At 1/50 dense hair gets holes to the background.
+const OPAQUE: f32 = 1.0 / 400.0;
 
 /// How far behind the skin's depth sample a hair may be and still show, pixels at its depth. Roots lie in the skin and
 /// the sample of a sloping skin is up to a pixel beside the hair: under 1, roots flicker; over 4, hair shines through
@@ -52,7 +53,7 @@ impl Filter {
     #[inline]
     fn upto(&self, x: f32) -> f32 {
         let x = (x.clamp(-REACH, REACH) + REACH) * STEPS as f32;
-        let i = x as usize;
+        let i = x as i32 as usize;
         let (a, b) = (self.table[i], self.table[i + 1]);
         a + (b - a) * (x - i as f32)
     }
@@ -105,6 +106,10 @@ pub(crate) struct Tile {
     width: usize,
     height: usize,
     pixel: Vec<Pixel>,
+    /// Per row a bit for each pixel through which more can be seen.
+    open: [u64; TILE],
+    /// Number of those bits.
+    left: usize,
     /// Triangle seen at each sample; empty as long as there is none.
     triangle: Vec<[u32; 4]>,
 }
@@ -113,7 +118,21 @@ impl Tile {
     /// An empty tile: its pixel (0, 0) is (x0, y0) of the picture.
     pub fn new(x0: usize, y0: usize, width: usize, height: usize) -> Tile {
         let pixel = Pixel { rgb: [0.0; 3], strand: NOBODY, covered: 0.0, through: [1.0; 4], depth: [f32::INFINITY; 4] };
-        Tile { x0, y0, width, height, pixel: vec![pixel; width * height], triangle: Vec::new() }
+        Tile {
+            x0,
+            y0,
+            width,
+            height,
+            pixel: vec![pixel; width * height],
+            open: [ones(width); TILE],
+            left: width * height,
+            triangle: Vec::new(),
+        }
+    }
+
+    /// True if nothing behind what is drawn can be seen.
+    pub fn full(&self) -> bool {
+        self.left == 0
     }
 
     /// Draws a triangle into the depth samples. `inverse` if depth is linear as 1 / z over the picture (perspective).
@@ -165,12 +184,11 @@ impl Tile {
         let half = [0.5 * a.width, 0.5 * (b.width - a.width)];
         let bias = BIAS * pixel_size;
         let tall = uy.abs() * REACH + ux.abs() * side;
-        let top = (ay.min(ay + dy) - tall - 0.5).ceil().max(0.0);
-        let bottom = (ay.max(ay + dy) + tall - 0.5).floor().min(self.height as f32 - 1.0);
-        if top > bottom {
-            return;
-        }
-        for j in top as usize..=bottom as usize {
+        let Some((top, bottom)) = centres(ay.min(ay + dy) - tall, ay.max(ay + dy) + tall, self.height) else { return };
+        for j in top..=bottom {
+            if self.open[j] == 0 {
+                continue;
+            }
             let ry = j as f32 + 0.5 - ay;
             // Across: |ux ry - uy rx| <= side. Along: -REACH <= ux rx + uy ry <= length + REACH.
             let (mut lo, mut hi) = (-ax, self.width as f32 - ax);
@@ -182,18 +200,11 @@ impl Tile {
                 let (s, e) = ((-REACH - uy * ry) / ux, (length + REACH - uy * ry) / ux);
                 (lo, hi) = (lo.max(s.min(e)), hi.min(s.max(e)));
             }
-            let first = (lo + ax - 0.5).ceil().max(0.0);
-            let last = (hi + ax - 0.5).floor().min(self.width as f32 - 1.0);
-            if first > last {
-                continue;
-            }
-            let row = j * self.width;
-            for i in first as usize..=last as usize {
-                let pixel = &mut self.pixel[row + i];
-                let t = pixel.through;
-                if t[0].max(t[1]).max(t[2].max(t[3])) < OPAQUE {
-                    continue;
-                }
+            let Some((first, last)) = centres(lo + ax, hi + ax, self.width) else { continue };
+            let mut todo = self.open[j] & ones(last + 1) & !ones(first);
+            while todo != 0 {
+                let i = todo.trailing_zeros() as usize;
+                todo &= todo - 1;
                 let rx = i as f32 + 0.5 - ax;
                 let (across, along) = (ux * ry - uy * rx, ux * rx + uy * ry);
                 let f = (along * per).clamp(0.0, 1.0);
@@ -203,50 +214,48 @@ impl Tile {
                     cover *= filter.upto(along) - filter.upto(along - length);
                 }
                 let rgb = std::array::from_fn(|c| a.rgb[c] + (b.rgb[c] - a.rgb[c]) * f);
-                pixel.blend(rgb, cover * opacity, a.z + (b.z - a.z) * f - bias, a.strand);
+                let pixel = &mut self.pixel[j * self.width + i];
+                if pixel.blend(rgb, cover * opacity, a.z + (b.z - a.z) * f - bias, a.strand) < OPAQUE {
+                    self.open[j] &= !(1 << i);
+                    self.left -= 1;
+                }
             }
         }
     }
 
-    /// The finished colours, row by row. `skin` gives the colour of triangle at a pixel position and depth.
+    /// The finished colours, row by row. `skin` gives the colour of a triangle at a pixel position and depth.
     pub fn resolve(&self, background: [f32; 3], skin: impl Fn(u32, [f64; 2], f32) -> V3) -> Vec<[f32; 3]> {
-        let behind = V3::from(background);
-        let finish = |k: usize| {
-            let p = &self.pixel[k];
-            let mut rgb = V3::from(p.rgb);
+        let finish = |(k, p): (usize, &Pixel)| {
             let seen = self.triangle.get(k).copied().unwrap_or([NOBODY; 4]);
-            let mut known = [behind; 4];
-            for s in 0..4 {
-                if seen[s] != NOBODY && p.through[s] >= OPAQUE {
-                    let same = (0..s).find(|&r| seen[r] == seen[s] && p.through[r] >= OPAQUE);
-                    known[s] = same.map_or_else(
-                        || {
-                            let x = (self.x0 + k % self.width) as f64 + SAMPLE[s][0];
-                            let y = (self.y0 + k / self.width) as f64 + SAMPLE[s][1];
-                            skin(seen[s], [x, y], p.depth[s])
-                        },
-                        |r| known[r],
-                    );
-                }
-            }
             if seen == [NOBODY; 4] && p.through == [1.0; 4] {
                 return background;
             }
-            for s in 0..4 {
-                rgb += known[s] * (0.25 * p.through[s]);
+            let mut rgb = V3::from(p.rgb);
+            // The last triangle and its colour: samples of one triangle share one.
+            let mut known = (NOBODY, V3::from(background));
+            for ((&triangle, &through), (&depth, at)) in seen.iter().zip(&p.through).zip(p.depth.iter().zip(&SAMPLE)) {
+                if triangle == NOBODY {
+                    rgb += V3::from(background) * (0.25 * through);
+                } else if through >= OPAQUE {
+                    if known.0 != triangle {
+                        let (x, y) = (self.x0 + k % self.width, self.y0 + k / self.width);
+                        known = (triangle, skin(triangle, [x as f64 + at[0], y as f64 + at[1]], depth));
+                    }
+                    rgb += known.1 * (0.25 * through);
+                }
             }
             rgb.into()
         };
-        (0..self.pixel.len()).map(finish).collect()
+        self.pixel.iter().enumerate().map(finish).collect()
     }
 }
 
 impl Pixel {
     /// Puts a coverage of colour behind what is there, at the samples whose skin is not nearer than `z`. Coverages of one
     /// strand add up, where those of different strands multiply what is left: pieces of a hair lie side by side, so
-    /// a hair looks the same however many pieces it has.
+    /// a hair looks the same however many pieces it has. Returns what comes through at most.
     #[inline]
-    fn blend(&mut self, rgb: [f32; 3], alpha: f32, z: f32, strand: u32) {
+    fn blend(&mut self, rgb: [f32; 3], alpha: f32, z: f32, strand: u32) -> f32 {
         if self.strand != strand {
             (self.strand, self.covered) = (strand, 0.0);
         }
@@ -261,10 +270,30 @@ impl Pixel {
             samples += open;
         }
         self.covered += 0.25 * alpha * samples;
-        for c in 0..3 {
-            self.rgb[c] += 0.25 * seen * rgb[c];
+        for (sum, c) in self.rgb.iter_mut().zip(rgb) {
+            *sum += 0.25 * seen * c;
         }
+        let t = self.through;
+        t[0].max(t[1]).max(t[2].max(t[3]))
     }
+}
+
+/// The lowest `n` bits.
+fn ones(n: usize) -> u64 {
+    if n >= 64 { u64::MAX } else { (1 << n) - 1 }
+}
+
+/// First and last of `size` pixels whose centres lie in [low, high].
+#[inline]
+fn centres(low: f32, high: f32, size: usize) -> Option<(usize, usize)> {
+    let (low, high) = ((low - 0.5).max(0.0), high - 0.5);
+    if !(high >= low && low < size as f32) {
+        return None;
+    }
+    let first = low as usize;
+    let first = if (first as f32) < low { first + 1 } else { first };
+    let last = (high as usize).min(size - 1);
+    (first <= last).then_some((first, last))
 }
 
 /// Twice the area of the triangle a, b, p.

@@ -18,9 +18,9 @@ pub fn studio_lights(camera: &Camera) -> Vec<Light> {
     let light =
         |x: f64, y: f64, z: f64, color| Light { direction: (axis[0] * x + axis[1] * y + axis[2] * z).into(), color };
     vec![
-        light(0.55, 0.75, 0.75, [1.75, 1.62, 1.45]),
-        light(-0.8, 0.1, 0.75, [0.34, 0.40, 0.50]),
-        light(-0.55, 0.75, -0.8, [1.15, 1.22, 1.35]),
+        light(0.55, 0.75, 0.75, [1.30, 1.22, 1.12]),
+        light(-0.8, 0.1, 0.75, [0.26, 0.30, 0.38]),
+        light(-0.55, 0.75, -0.8, [0.80, 0.85, 0.94]),
     ]
 }
 
@@ -33,35 +33,35 @@ pub struct HairShade {
     /// Factor of the first highlight, which has the light's colour.
     pub specular: f32,
     /// Its exponent: 20 is dull, 150 is polished.
-    pub exponent: f32,
+    pub exponent: u32,
     /// Degrees by which it moves towards the root: the slope of the scales, about 7 on human hair.
     pub shift_deg: f32,
     /// Factor of the second highlight, which has the hair's colour.
     pub glint: f32,
     /// Its exponent: lower than the first.
-    pub glint_exponent: f32,
+    pub glint_exponent: u32,
     /// Degrees by which it moves towards the tip.
     pub glint_shift_deg: f32,
     /// Light that comes through from behind, relative to light sent back to the front (Goldman 1997, "Fake fur
     /// rendering", the ratio of its transmission and reflection factors).
     pub through: f32,
     /// How much a hair that stands up takes the shading of the skin at its root, in [0, 1]: the production pipeline's
-    /// mixed normal (§4.1), which gives short fur the form of the body. Only with root normals.
+    /// mixed normal (§4.4), which gives short fur the form of the body. Only with root normals.
     pub skin_normal: f32,
 }
 
 impl Default for HairShade {
     fn default() -> Self {
         HairShade {
-            diffuse: 0.62,
-            specular: 0.16,
-            exponent: 55.0,
+            diffuse: 0.66,
+            specular: 0.19,
+            exponent: 60,
             shift_deg: 7.0,
-            glint: 0.55,
-            glint_exponent: 14.0,
+            glint: 0.6,
+            glint_exponent: 16,
             glint_shift_deg: 9.0,
             through: 0.6,
-            skin_normal: 0.5,
+            skin_normal: 0.8,
         }
     }
 }
@@ -88,26 +88,32 @@ pub(crate) struct HairModel {
 struct Lobe {
     cos: f32,
     sin: f32,
-    exponent: f32,
-    /// Below this the highlight is less than [`FAINT`], and taken as 0.
-    cutoff: f32,
+    exponent: u32,
 }
 
-/// A highlight under this part of its peak is not computed: invisible in 8 bits.
-const FAINT: f32 = 1e-4;
-
 impl Lobe {
-    fn new(shift_deg: f32, exponent: f32) -> Lobe {
+    fn new(shift_deg: f32, exponent: u32) -> Lobe {
         let a = f64::from(shift_deg).to_radians();
-        let exponent = exponent.clamp(1.0, 1e4);
-        Lobe { cos: libm::cos(a) as f32, sin: libm::sin(a) as f32, exponent, cutoff: libm::powf(FAINT, 1.0 / exponent) }
+        Lobe { cos: libm::cos(a) as f32, sin: libm::sin(a) as f32, exponent }
     }
 
     /// The highlight for -cos(a + b) and sin(a + b), a and b the angles of light and eye with the hair.
     fn value(&self, cos: f32, sin: f32) -> f32 {
-        let c = cos * self.cos + sin * self.sin;
-        if c <= self.cutoff { 0.0 } else { libm::powf(c.min(1.0), self.exponent) - FAINT }
+        power((cos * self.cos + sin * self.sin).clamp(0.0, 1.0), self.exponent)
     }
+}
+
+/// x^n by squaring: always the same products, unlike a library's power.
+fn power(x: f32, n: u32) -> f32 {
+    let (mut square, mut left, mut out) = (x, n, 1.0);
+    while left > 0 {
+        if left & 1 == 1 {
+            out *= square;
+        }
+        square *= square;
+        left >>= 1;
+    }
+    out
 }
 
 impl HairModel {
@@ -159,14 +165,14 @@ pub(crate) fn to_light(light: &Light) -> Vec3 {
 mod tests {
     use super::*;
 
-    fn plain(exponent: f32) -> HairModel {
+    fn plain(exponent: u32) -> HairModel {
         HairModel::new(HairShade {
             diffuse: 0.0,
             specular: 1.0,
             exponent,
             shift_deg: 0.0,
             glint: 0.0,
-            glint_exponent: 1.0,
+            glint_exponent: 1,
             glint_shift_deg: 0.0,
             through: 1.0,
             skin_normal: 0.0,
@@ -175,7 +181,7 @@ mod tests {
 
     #[test]
     fn the_highlight_peaks_on_the_mirror_cone() {
-        let model = plain(60.0);
+        let model = plain(60);
         let tangent = V3::x();
         let light = V3::new(0.6, 0.8, 0.0);
         let (mut best, mut at) = (0.0, 0.0f64);
@@ -195,8 +201,8 @@ mod tests {
     fn a_shift_moves_the_peak_towards_the_root() {
         // Hair bending from tangent angle 50 (towards the eye at its root) to 130 degrees; light and eye along +x.
         let peak = |shift: f32| {
-            let mut model = plain(80.0);
-            model.first = Lobe::new(shift, 80.0);
+            let mut model = plain(80);
+            model.first = Lobe::new(shift, 80);
             let value = |a: f64| {
                 let t = V3::new(libm::cos(a.to_radians()) as f32, libm::sin(a.to_radians()) as f32, 0.0);
                 model.reflect(t, V3::x(), V3::x(), None, V3::zeros()).x

@@ -22,6 +22,10 @@ const LIFT: f32 = 0.75;
 /// Texels by which skin must be nearer to the light to shadow a point, and over which that shadow sets in.
 const SKIN_BIAS: f32 = 2.5;
 
+/// Texels that a point of the skin is lifted along its normal: without, slopes along the light shadow themselves in
+/// rings.
+const SKIN_LIFT: f32 = 2.5;
+
 /// Parts that are summed apart and then together in this order: the same sum for any number of threads.
 const PARTS: usize = 4;
 
@@ -62,7 +66,7 @@ impl Box3 {
     }
 
     /// The same coordinates from camera space.
-    fn from_camera(&self, view: &View) -> Affine {
+    fn seen_by(&self, view: &View) -> Affine {
         let origin = self.place(view.eye);
         Affine(std::array::from_fn(|i| {
             let a = view.turn(self.axis[i]) * self.per_unit[i];
@@ -89,8 +93,9 @@ impl Affine {
 pub(crate) struct Slabs {
     /// Camera space to the hair's cells, and per column `CELLS + 1` sums of optical depth down from the light.
     hair: Option<(Affine, Vec<f32>)>,
-    /// Camera space to the skin's texels, and the depth of the skin nearest to the light, in texels.
-    skin: Option<(Affine, Vec<f32>)>,
+    /// Camera space to the skin's texels, the depth of the skin nearest to the light in texels, and their size in scene
+    /// units.
+    skin: Option<(Affine, Vec<f32>, f32)>,
 }
 
 impl Slabs {
@@ -101,10 +106,12 @@ impl Slabs {
         let x = (x - z * z.dot(&x)).normalize();
         let axis = [x, z.cross(&x), z];
         let points = scene.layers.iter().flat_map(|l| l.position.iter().map(|p| in_layer(l, p)));
-        let hair = Box3::around(axis, CELLS, points).map(|b| (b.from_camera(view), hair_grid(scene, &b)));
+        let hair = Box3::around(axis, CELLS, points).map(|b| (b.seen_by(view), hair_grid(scene, &b)));
         let skin = scene.skin.as_ref().and_then(|s| {
-            let b = Box3::around(axis, TEXELS, s.position.iter().map(|&p| Vec3::from(p)))?;
-            Some((b.from_camera(view), skin_map(s, &b)))
+            let mut b = Box3::around(axis, TEXELS, s.position.iter().map(|&p| Vec3::from(p)))?;
+            // Depth in texels too, so that one bias fits any skin.
+            b.per_unit[2] = b.per_unit[0].min(b.per_unit[1]);
+            Some((b.seen_by(view), skin_map(s, &b), (1.0 / b.per_unit[2]) as f32))
         });
         Slabs { hair, skin }
     }
@@ -118,9 +125,9 @@ impl Slabs {
             return 0.0;
         }
         let z = (z - LIFT).clamp(0.0, n - 1e-3);
-        let (k, fz) = (z as usize, z - z.floor());
+        let (k, fz) = split(z);
         let (x, y) = ((x - 0.5).clamp(0.0, n - 1.001), (y - 0.5).clamp(0.0, n - 1.001));
-        let (i, j, fx, fy) = (x as usize, y as usize, x - x.floor(), y - y.floor());
+        let ((i, fx), (j, fy)) = (split(x), split(y));
         let at = |i: usize, j: usize| {
             let c = (j * CELLS + i) * (CELLS + 1) + k;
             sum[c] + (sum[c + 1] - sum[c]) * fz
@@ -130,21 +137,29 @@ impl Slabs {
         low * (1.0 - fy) + high * fy
     }
 
-    /// Part of the light that no skin is in the way of, in [0, 1].
-    pub fn skin_light(&self, p: V3) -> f32 {
-        let Some((affine, depth)) = &self.skin else { return 1.0 };
-        let [x, y, z] = affine.apply(p);
+    /// Part of the light that no skin is in the way of, in [0, 1]. `normal` is the unit normal of the skin if the point is
+    /// on it, else zero.
+    pub fn skin_light(&self, p: V3, normal: V3) -> f32 {
+        let Some((affine, depth, texel)) = &self.skin else { return 1.0 };
+        let [x, y, z] = affine.apply(p + normal * (SKIN_LIFT * texel));
         let n = TEXELS as f32;
         if !(x > 0.0 && y > 0.0 && x < n && y < n) {
             return 1.0;
         }
         let (x, y) = ((x - 0.5).clamp(0.0, n - 1.001), (y - 0.5).clamp(0.0, n - 1.001));
-        let (i, j, fx, fy) = (x as usize, y as usize, x - x.floor(), y - y.floor());
+        let ((i, fx), (j, fy)) = (split(x), split(y));
         let lit = |i: usize, j: usize| 1.0 - ((z - depth[j * TEXELS + i]) / SKIN_BIAS - 1.0).clamp(0.0, 1.0);
         let low = lit(i, j) * (1.0 - fx) + lit(i + 1, j) * fx;
         let high = lit(i, j + 1) * (1.0 - fx) + lit(i + 1, j + 1) * fx;
         low * (1.0 - fy) + high * fy
     }
+}
+
+/// Whole and broken part of a number in [0, 2^31).
+#[inline]
+fn split(x: f32) -> (usize, f32) {
+    let i = x as i32;
+    (i as usize, x - i as f32)
 }
 
 /// Optical depth (opacity times covered part of a cell's cross-section) of all hairs, summed down each column.
@@ -186,7 +201,7 @@ fn splat(layer: &crate::HairView, s: usize, cells: &Box3, grid: &mut [f32]) {
         // Length seen from the light, scene units.
         let (u, v) = (d[0] / cells.per_unit[0], d[1] / cells.per_unit[1]);
         let width = f64::from(0.5 * (layer.width(i - 1) + layer.width(i)));
-        let steps = ((long * 1.2) as usize + 1).min(4 * CELLS);
+        let steps = ((long * 1.2) as usize).min(4 * CELLS) + 1;
         let each = ((u * u + v * v).sqrt() * width * per_area) as f32 * opacity / steps as f32;
         for k in 0..steps {
             let f = (k as f64 + 0.5) / steps as f64;
@@ -242,4 +257,61 @@ fn skin_map(skin: &crate::SkinView, texels: &Box3) -> Vec<f32> {
         }
     }
     depth
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Camera, HairView};
+    use pelage_geom::{Offsets, rng};
+
+    #[test]
+    fn optical_depth_of_random_hairs_is_their_projected_area() {
+        let (n, width, opacity) = (20_000usize, 0.01f32, 0.7f32);
+        let u = |i: usize, c: u64| rng::uniform(11, i as u64, c, 0) as f32;
+        let mut position = Vec::new();
+        let mut area = 0.0;
+        for i in 0..n {
+            let a = [4.0 * u(i, 0), 4.0 * u(i, 1), 4.0 * u(i, 2)];
+            let b = [4.0 * u(i, 3), 4.0 * u(i, 4), 4.0 * u(i, 5)];
+            position.extend([a, b]);
+            // Seen along y.
+            area += ((a[0] - b[0]).powi(2) + (a[2] - b[2]).powi(2)).sqrt() * width;
+        }
+        let offsets = Offsets::uniform(n, 2);
+        let layers = [HairView {
+            offsets: &offsets,
+            position: &position,
+            origin: [0.0; 3],
+            width: &vec![width; 2 * n],
+            color: &[],
+            opacity: &vec![opacity; n],
+            root_normal: &[],
+        }];
+        let scene = Scene { skin: None, layers: &layers, lights: &[], background: [0.0; 3] };
+        let camera = Camera {
+            eye: [2.0, 2.0, 30.0],
+            target: [2.0; 3],
+            up: [0.0, 1.0, 0.0],
+            fov_y_deg: 30.0,
+            near: 0.1,
+            parallel_height: None,
+        };
+        let view = camera.view(100, 100);
+        let slabs = Slabs::new(&scene, Vec3::y(), &view);
+        let depth = |x: f64, y: f64, z: f64| slabs.hair_depth(view.to_camera(Vec3::new(x, y, z)).cast());
+        let (mut sum, mut last) = (0.0, 0.0);
+        for i in 0..400 {
+            let (x, z) = (0.2 * f64::from(i % 20) + 0.1, 0.2 * f64::from(i / 20) + 0.1);
+            sum += depth(x, -1.0, z);
+        }
+        let mean = opacity * area / 16.0;
+        assert!((sum / 400.0 / mean - 1.0).abs() < 0.03, "{} instead of {mean}", sum / 400.0);
+        for k in 0..=40 {
+            let d = depth(2.0, 4.0 - 0.1 * f64::from(k), 2.0);
+            assert!(d >= last);
+            last = d;
+        }
+        assert_eq!((depth(2.0, 5.0, 2.0), depth(-9.0, 0.0, 2.0)), (0.0, 0.0));
+    }
 }

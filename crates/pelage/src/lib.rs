@@ -3,6 +3,7 @@
 pub mod cache;
 pub mod cli;
 pub mod config;
+pub mod curves;
 pub mod error;
 pub mod files;
 pub mod format;

@@ -23,7 +23,8 @@ struct Chart {
     extent: [f64; 2],
 }
 
-/// Space between charts and to the border of the texture square: 10 texels of a 512 map.
+/// Space between charts and to the border of the texture square: 10 texels of a 512 map. With less, charts bleed into each
+/// other on small maps; with more, texels are wasted.
 const GAP: f64 = 0.02;
 
 /// Mirrors the half `position`, `triangle` (x >= 0, the border at x = 0) and lays it out. `part_of` names the part of a
@@ -173,7 +174,7 @@ fn turn_upright(position: &[Vec3], uv: &mut [[f64; 2]], up: Vec3) {
         let h = p.dot(&up) - height;
         (0..2).for_each(|c| d[c] += h * (q[c] - mean[c]));
     }
-    let norm = d[0].hypot(d[1]).max(1e-12);
+    let norm = libm::hypot(d[0], d[1]).max(1e-12);
     let (s, c) = (d[0] / norm, d[1] / norm);
     uv.iter_mut().for_each(|p| *p = [c * p[0] - s * p[1], s * p[0] + c * p[1]]);
 }
@@ -193,7 +194,7 @@ impl Chart {
 /// first; a chart goes on the first shelf with room.
 fn shelves(charts: &[Chart], order: &[usize], scale: f64) -> Option<Vec<[f64; 2]>> {
     let mut corner = vec![[0.0; 2]; charts.len()];
-    // (bottom, height, next u, and the next free v above the charts of each column is not tracked: shelves are plain)
+    // Bottom, height, next free u.
     let mut shelf: Vec<[f64; 3]> = Vec::new();
     let mut top = GAP;
     for &k in order {

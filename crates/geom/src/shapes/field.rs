@@ -44,6 +44,30 @@ pub fn chain(p: Vec3, points: &[(Vec3, f64)], k: f64) -> f64 {
     f
 }
 
+/// Catmull-Rom curve through `(point, radius)`, four segments for each given one.
+pub fn spline(points: &[(Vec3, f64)]) -> Vec<(Vec3, f64)> {
+    let at = |i: i64| points[i.clamp(0, points.len() as i64 - 1) as usize];
+    let mut out = Vec::new();
+    for i in 0..points.len() as i64 - 1 {
+        let (a, b, c, d) = (at(i - 1), at(i), at(i + 1), at(i + 2));
+        for k in 0..4 {
+            let t = f64::from(k) / 4.0;
+            let w = [
+                t * (-0.5 + t * (1.0 - 0.5 * t)),
+                1.0 + t * t * (-2.5 + 1.5 * t),
+                t * (0.5 + t * (2.0 - 1.5 * t)),
+                t * t * (-0.5 + 0.5 * t),
+            ];
+            out.push((
+                a.0 * w[0] + b.0 * w[1] + c.0 * w[2] + d.0 * w[3],
+                a.1 * w[0] + b.1 * w[1] + c.1 * w[2] + d.1 * w[3],
+            ));
+        }
+    }
+    out.extend(points.last());
+    out
+}
+
 /// Smooth union over a blend width `k` (scene units): inflates by at most k / 6 where both fields are equal.
 pub fn join(a: f64, b: f64, k: f64) -> f64 {
     let h = (k - (a - b).abs()).max(0.0) / k;

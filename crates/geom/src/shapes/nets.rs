@@ -103,12 +103,23 @@ fn sample(grid: &Grid, field: &(dyn Fn(Vec3) -> f64 + Sync), low: [i64; 3], n: [
 pub fn polygonise(grid: &Grid, field: &(dyn Fn(Vec3) -> f64 + Sync)) -> QuadMesh {
     let (low, n) = grid.nodes();
     let value = sample(grid, field, low, n);
+    let (position, cell_vertex) = vertices(grid, &value, low, n);
+    QuadMesh { position, quad: quads(&value, &cell_vertex, n) }
+}
+
+/// Grid coordinates of entry `at` of an array of `n` entries per axis, x fastest.
+fn coordinates(at: usize, n: [usize; 3]) -> [usize; 3] {
+    [at % n[0], at / n[0] % n[1], at / n[0] / n[1]]
+}
+
+/// One vertex per crossed cell, at the mean of the crossings of its edges: positions, and the vertex of each cell (named
+/// by its lowest node).
+fn vertices(grid: &Grid, value: &[f64], low: [i64; 3], n: [usize; 3]) -> (Vec<Vec3>, Vec<u32>) {
     let index = |c: [usize; 3]| (c[2] * n[1] + c[1]) * n[0] + c[0];
     let node = |c: [usize; 3]| grid.space(Vec3::from_fn(|a, _| (low[a] + c[a] as i64) as f64 + 0.5));
-    let mut cell_vertex = vec![NONE; value.len()];
-    let mut mesh = QuadMesh::default();
-    for at in 0..value.len() {
-        let c = [at % n[0], at / n[0] % n[1], at / n[0] / n[1]];
+    let (mut position, mut cell_vertex) = (Vec::new(), vec![NONE; value.len()]);
+    for (at, vertex) in cell_vertex.iter_mut().enumerate() {
+        let c = coordinates(at, n);
         if (0..3).any(|a| c[a] + 1 >= n[a]) {
             continue;
         }
@@ -128,40 +139,38 @@ pub fn polygonise(grid: &Grid, field: &(dyn Fn(Vec3) -> f64 + Sync)) -> QuadMesh
                 }
             }
         }
-        cell_vertex[at] = mesh.position.len() as u32;
+        *vertex = position.len() as u32;
         let mut p = sum / count;
         if low[0] + c[0] as i64 == -1 {
             p.x = 0.0;
         }
-        mesh.position.push(p);
+        position.push(p);
     }
+    (position, cell_vertex)
+}
+
+/// One quad per grid edge that the surface crosses, around the edge's four cells.
+fn quads(value: &[f64], cell_vertex: &[u32], n: [usize; 3]) -> Vec<[u32; 4]> {
+    let stride = [1, n[0], n[0] * n[1]];
+    let mut quad = Vec::new();
     for at in 0..value.len() {
-        let c = [at % n[0], at / n[0] % n[1], at / n[0] / n[1]];
+        let c = coordinates(at, n);
         for axis in 0..3 {
             let (u, w) = ((axis + 1) % 3, (axis + 2) % 3);
             if c[axis] + 1 >= n[axis] || c[u] == 0 || c[w] == 0 {
                 continue;
             }
-            let step = |c: [usize; 3], d: [usize; 3]| index(std::array::from_fn(|a| c[a] - d[a]));
-            let mut next = c;
-            next[axis] += 1;
-            let (a, b) = (value[at] < 0.0, value[index(next)] < 0.0);
-            if a == b {
-                continue;
+            let (a, b) = (value[at] < 0.0, value[at + stride[axis]] < 0.0);
+            if a != b {
+                let mut ring = [at - stride[u] - stride[w], at - stride[w], at, at - stride[u]];
+                if b {
+                    ring.reverse();
+                }
+                quad.push(ring.map(|k| cell_vertex[k]));
             }
-            let unit = |a: usize, on: usize| usize::from(a == on);
-            let cell = |du: bool, dw: bool| {
-                step(c, std::array::from_fn(|a| unit(a, u) * usize::from(du) + unit(a, w) * usize::from(dw)))
-            };
-            let ring = [cell(true, true), cell(false, true), cell(false, false), cell(true, false)];
-            let mut quad = ring.map(|k| cell_vertex[k]);
-            if b {
-                quad.reverse();
-            }
-            mesh.quad.push(quad);
         }
     }
-    mesh
+    quad
 }
 
 /// Gradient and value of a field by four samples on a tetrahedron of half-size `h`.

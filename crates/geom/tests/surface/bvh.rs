@@ -200,3 +200,22 @@ fn rays_agree_with_brute_force_and_slip_through_nothing() {
     assert_eq!(h.ray(Vec3::new(2.0, 0.0, 0.0), Vec3::x(), f64::INFINITY), None);
     assert_eq!(h.ray(Vec3::zeros(), Vec3::zeros(), 9.0), None);
 }
+
+#[test]
+fn slivers_lose_nothing() {
+    // Height against length from ordinary to nothing, in a skew plane; queries above known feet.
+    let (along, up) = (Vec3::new(1.0, 2.0, 2.0) / 3.0, Vec3::new(2.0, 1.0, -2.0) / 3.0);
+    for height in [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 0.0] {
+        let p = [Vec3::zeros(), along, along * 0.4 + up * height].map(|v| v.into());
+        let h = bvh(&mesh(p.to_vec(), &[], vec![[0, 1, 2]]));
+        for k in 0..200 {
+            let foot = along * rng::uniform(7, k, 0, 0) + up * (height * 0.5 * rng::uniform(7, k, 0, 1));
+            let q = foot + along.cross(&up) * rng::uniform(7, k, 0, 2);
+            let found = h.closest(q, 9.0).unwrap();
+            let (x, y) = (foot.dot(&along), foot.dot(&up));
+            if y < height * (x / 0.4).min((1.0 - x) / 0.6) {
+                assert!((found.position - foot).norm() < 3e-8, "{height} {foot} {found:?}");
+            }
+        }
+    }
+}

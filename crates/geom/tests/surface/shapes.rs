@@ -71,7 +71,9 @@ pub fn cube(n: usize) -> Mesh {
     for axis in 0..3 {
         for side in [-1.0, 1.0] {
             let face = grid(n, n, |u, v| {
-                let (a, b) = (2.0 * u - 1.0, side * (2.0 * v - 1.0));
+                // Rounded to be the same from both sides of an edge.
+                let even = |x: f64| ((2.0 * x - 1.0) * n as f64).round() / n as f64;
+                let (a, b) = (even(u), side * even(v));
                 let mut p = [0.0; 3];
                 (p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]) = (side, a, b);
                 p

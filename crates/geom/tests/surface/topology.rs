@@ -142,6 +142,7 @@ fn rounding_of_text_files_does_not_make_charts() {
 
 #[test]
 fn without_texture_coordinates_charts_are_components() {
+    assert_eq!(of(&cube(3)).counts.open_edges, 0);
     let mut m = cube(2);
     let t = of(&m);
     assert_eq!((t.charts, t.counts.seam_edges, t.counts.open_edges), (1, 0, 0));

@@ -133,8 +133,10 @@ pub struct CacheArguments {
 /// Samples that `init` makes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Sample {
-    /// A human bust with long hair.
+    /// A human bust with long hair, shaking its head.
     Bust,
+    /// The same bust turning and nodding: a deforming sequence.
+    BustNod,
     /// A short-furred animal with undercoat and overcoat.
     Animal,
 }

@@ -208,7 +208,7 @@ impl Bounds {
             for k in 0..12 {
                 lo[k] = if v[k] < lo[k] { v[k] } else { lo[k] };
                 hi[k] = if v[k] > hi[k] { v[k] } else { hi[k] };
-                wrong[k] |= u32::from(v[k].abs() >= f32::INFINITY) | u32::from(v[k] != v[k]);
+                wrong[k] |= u32::from(!v[k].is_finite());
             }
         };
         for block in blocks {

@@ -21,87 +21,105 @@ pub fn read_hair(path: &Path) -> Result<Curves, FormatError> {
     parse_hair(path, &read_bytes(path)?)
 }
 
-fn parse_hair(path: &Path, bytes: &[u8]) -> Result<Curves, FormatError> {
-    let wrong = |what: String| FormatError::new(path, what);
+/// The numbers of a header, and where the arrays lie.
+struct Header {
+    hairs: usize,
+    points: usize,
+    arrays: u32,
+    segments: usize,
+    thickness: f32,
+    /// Ends of segments, points, thickness and of everything; the segments start after the header.
+    ends: [usize; 4],
+}
+
+fn parse_header(path: &Path, bytes: &[u8]) -> Result<Header, FormatError> {
+    let wrong = |what: String| Err(FormatError::new(path, what));
     if bytes.len() < HEADER || !bytes.starts_with(b"HAIR") {
-        let what = "not a .hair file: it does not start with 'HAIR' and a header of 128 bytes";
-        return Err(wrong(what.to_owned()));
+        return wrong("not a .hair file: it does not start with 'HAIR' and a header of 128 bytes".to_owned());
     }
     let word = |at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
-    let (hairs, points, arrays, d_segments) = (word(4) as usize, word(8) as usize, word(12), word(16) as usize);
-    let d_thickness = f32::from_bits(word(20));
+    let (hairs, points, arrays) = (word(4) as usize, word(8) as usize, word(12));
     if hairs == 0 {
-        return Err(wrong("holds no hairs".to_owned()));
+        return wrong("holds no hairs".to_owned());
     }
     if arrays & POINTS == 0 {
-        return Err(wrong("holds no points (bit 1 of its arrays is not set)".to_owned()));
+        return wrong("holds no points (bit 1 of its arrays is not set)".to_owned());
     }
-    let has = |bit: u32, bytes: usize| if arrays & bit != 0 { bytes as u64 } else { 0 };
-    let sizes = [
-        has(SEGMENTS, 2 * hairs),
-        12 * points as u64,
-        has(THICKNESS, 4 * points),
-        has(TRANSPARENCY, 4 * points),
-        has(COLORS, 12 * points),
-    ];
-    let expected = HEADER as u64 + sizes.iter().sum::<u64>();
-    if expected > bytes.len() as u64 {
-        let what =
-            format!("{hairs} hairs with {points} points need {expected} bytes, but the file has {}", bytes.len());
-        return Err(wrong(what).hint("the file was cut short or its header is wrong; export or copy it again"));
+    let has = |bit: u32, bytes: u64| if arrays & bit != 0 { bytes } else { 0 };
+    let (h, p) = (hairs as u64, points as u64);
+    let start = HEADER as u64 + has(SEGMENTS, 2 * h);
+    let thickness = start + 12 * p + has(THICKNESS, 4 * p);
+    let all = thickness + has(TRANSPARENCY, 4 * p) + has(COLORS, 12 * p);
+    if all > bytes.len() as u64 {
+        let what = format!("{hairs} hairs with {points} points need {all} bytes, but the file has {}", bytes.len());
+        let hint = "the file was cut short or its header is wrong; export or copy it again";
+        return Err(FormatError::new(path, what).hint(hint));
     }
-    let start = |k: usize| HEADER + sizes[..k].iter().sum::<u64>() as usize;
-    let segments: Vec<usize> = match arrays & SEGMENTS {
-        0 if (hairs as u64) * (d_segments as u64 + 1) != points as u64 => {
-            return Err(wrong(format!("{hairs} hairs of {} points do not give {points} points", d_segments + 1)));
+    let ends = [start, start + 12 * p, thickness, all].map(|e| e as usize);
+    Ok(Header { hairs, points, arrays, segments: word(16) as usize, thickness: f32::from_bits(word(20)), ends })
+}
+
+/// Segments of each hair; their points must sum to what the header says.
+fn segments(path: &Path, bytes: &[u8], header: &Header) -> Result<Vec<usize>, FormatError> {
+    let Header { hairs, points, segments, .. } = *header;
+    let wrong = |what: String| Err(FormatError::new(path, what));
+    if header.arrays & SEGMENTS == 0 {
+        return match hairs as u64 * (segments as u64 + 1) == points as u64 {
+            true => Ok(vec![segments; hairs]),
+            false => wrong(format!("{hairs} hairs of {} points do not give {points} points", segments as u64 + 1)),
+        };
+    }
+    let pairs = bytes[HEADER..header.ends[0]].chunks_exact(2);
+    let list: Vec<usize> = pairs.map(|b| usize::from(u16::from_le_bytes([b[0], b[1]]))).collect();
+    match list.iter().map(|s| s + 1).sum::<usize>() {
+        total if total == points => Ok(list),
+        total => wrong(format!("its hairs have {total} points in all, its header says {points}")),
+    }
+}
+
+fn floats(bytes: &[u8]) -> Vec<f32> {
+    bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
+}
+
+fn parse_hair(path: &Path, bytes: &[u8]) -> Result<Curves, FormatError> {
+    let header = parse_header(path, bytes)?;
+    let segments = segments(path, bytes, &header)?;
+    let position = floats(&bytes[header.ends[0]..header.ends[1]]);
+    let thickness: Option<Vec<f32>> = match header.arrays & THICKNESS {
+        0 if header.thickness.is_finite() && header.thickness > 0.0 && header.thickness != 1.0 => {
+            Some(vec![header.thickness; header.points])
         }
-        0 => vec![d_segments; hairs],
-        _ => bytes[start(0)..start(1)].chunks_exact(2).map(|b| usize::from(u16::from_le_bytes([b[0], b[1]]))).collect(),
-    };
-    let total = segments.iter().map(|s| s + 1).sum::<usize>();
-    if total != points {
-        return Err(wrong(format!("its hairs have {total} points in all, its header says {points}")));
-    }
-    let mut warnings = Vec::new();
-    if expected < bytes.len() as u64 {
-        warnings.push(format!("{} bytes after the last array were ignored", bytes.len() as u64 - expected));
-    }
-    let floats = |from: usize, n: usize| {
-        bytes[from..from + 4 * n].chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
-    };
-    let position: Vec<[f32; 3]> =
-        floats(start(1), 3 * points).collect::<Vec<_>>().chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
-    let thickness: Option<Vec<f32>> = match arrays & THICKNESS {
-        0 if d_thickness.is_finite() && d_thickness > 0.0 && d_thickness != 1.0 => Some(vec![d_thickness; points]),
         0 => None,
-        _ => Some(floats(start(2), points).collect()),
+        _ => Some(floats(&bytes[header.ends[1]..header.ends[2]])),
     };
-    let finite =
-        |p: usize| position[p].iter().all(|x| x.is_finite()) && thickness.as_ref().is_none_or(|t| t[p].is_finite());
+    let mut out = Curves { width: thickness.as_ref().map(|_| Vec::new()), ..Curves::default() };
     let info = String::from_utf8_lossy(&bytes[40..HEADER]).trim_end_matches('\0').trim().to_owned();
-    let mut out = Curves { width: thickness.as_ref().map(|_| Vec::new()), warnings, ..Curves::default() };
     out.comments.extend((!info.is_empty()).then_some(info));
-    let (mut first, mut counts) = (0, Vec::with_capacity(hairs));
+    let rest = bytes.len() - header.ends[3];
+    out.warnings.extend((rest > 0).then(|| format!("{rest} bytes after the last array were ignored")));
+    let (mut first, mut counts) = (0, Vec::with_capacity(header.hairs));
     for (h, s) in segments.iter().enumerate() {
         let range = first..first + s + 1;
         first = range.end;
-        if let Some(p) = range.clone().find(|p| !finite(*p)) {
-            let what = "position or thickness is not a finite number".to_owned();
-            return Err(wrong(what).at(format!("hair {h}, point {}", p - range.start)));
-        }
-        if *s > 0 {
-            counts.push(s + 1);
-            out.strands.position.extend_from_slice(&position[range.clone()]);
-            if let (Some(w), Some(t)) = (&mut out.width, &thickness) {
-                w.extend_from_slice(&t[range]);
+        for p in range.clone() {
+            let at = [position[3 * p], position[3 * p + 1], position[3 * p + 2]];
+            let width = thickness.as_ref().map(|t| t[p]);
+            if !at.iter().chain(&width).all(|x| x.is_finite()) {
+                let what = "position or thickness is not a finite number";
+                return Err(FormatError::new(path, what).at(format!("hair {h}, point {}", p - range.start)));
+            }
+            if *s > 0 {
+                out.strands.position.push(at);
+                out.width.iter_mut().for_each(|w| w.extend(width));
             }
         }
-    }
-    if counts.len() < hairs {
-        out.warnings.push(format!("{} hairs without a segment were skipped", hairs - counts.len()));
+        counts.extend((*s > 0).then_some(s + 1));
     }
     if counts.is_empty() {
-        return Err(wrong("no hair has a segment".to_owned()));
+        return Err(FormatError::new(path, "no hair has a segment"));
+    }
+    if counts.len() < header.hairs {
+        out.warnings.push(format!("{} hairs without a segment were skipped", header.hairs - counts.len()));
     }
     out.strands.offsets = Offsets::from_counts(counts);
     Ok(out)
@@ -202,10 +220,10 @@ mod tests {
     #[test]
     fn hairs_without_a_segment_are_skipped_and_counted() {
         let mut bytes = encode(&strands(&[2, 3, 2]), None, "").unwrap();
-        bytes[HEADER..HEADER + 6].copy_from_slice(&[2, 0, 0, 0, 3, 0]);
+        bytes[HEADER..HEADER + 6].copy_from_slice(&[2, 0, 0, 0, 2, 0]);
         let c = parse(&bytes).unwrap();
-        assert_eq!(c.strands.offsets, Offsets::from_counts([3, 4]));
-        assert_eq!(c.strands.position[3][0], 3.0 + 1.0);
+        assert_eq!(c.strands.offsets, Offsets::from_counts([3, 3]));
+        assert_eq!(c.strands.position[3][0], 4.0);
         assert!(c.warnings[0].contains("1 hairs"), "{:?}", c.warnings);
     }
 

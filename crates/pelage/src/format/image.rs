@@ -85,6 +85,15 @@ pub fn write_png(path: &Path, w: usize, h: usize, rgb8: &[u8]) -> Result<(), For
     encode_png(path, w, h, rgb8, 3, image::ExtendedColorType::Rgb8)
 }
 
+/// An 8-bit PNG of 1 (grey) or 3 (RGB) channels, top row first, in memory.
+pub fn png_bytes(w: usize, h: usize, channels: usize, bytes: &[u8]) -> Vec<u8> {
+    let kind = if channels == 1 { image::ExtendedColorType::L8 } else { image::ExtendedColorType::Rgb8 };
+    let mut out = Vec::new();
+    let encoder = image::codecs::png::PngEncoder::new(&mut out);
+    encoder.write_image(bytes, w as u32, h as u32, kind).expect("sizes fit and memory does not fail");
+    out
+}
+
 /// Writes 16-bit grey, `w * h` texels, top row first.
 pub fn write_png_gray16(path: &Path, w: usize, h: usize, gray: &[u16]) -> Result<(), FormatError> {
     encode_png(path, w, h, bytemuck::cast_slice(gray), 2, image::ExtendedColorType::L16)
@@ -143,7 +152,9 @@ fn open(path: &Path) -> Result<(Kind, BufReader<File>), FormatError> {
 
 fn broken(path: &Path, e: impl std::fmt::Display) -> FormatError {
     let text = e.to_string();
-    let text = text.trim_start_matches("Format error decoding Png: ");
+    let text =
+        text.trim_start_matches("Format error decoding Png: ").split(" while decoding").next().unwrap_or_default();
+    let text = text.trim_end_matches('.');
     FormatError::new(path, format!("the image cannot be decoded: {text}")).hint("save it again")
 }
 
@@ -321,6 +332,10 @@ fn exr_raster(
     };
     for (c, k) in picked.iter().enumerate() {
         let samples = &list[*k].sample_data;
+        if matches!(samples, FlatSamples::U32(_)) {
+            warnings
+                .push(format!("channel '{}' holds integers; they were taken as they are, not scaled to 1", names[*k]));
+        }
         for y in 0..layer.size.y() {
             let Some(row) = inside(y, corner.y(), height) else { continue };
             for x in 0..layer.size.x() {
@@ -410,4 +425,214 @@ fn select(path: &Path, raster: Raster, channel: Channel, warnings: &mut Vec<Stri
         return Err(FormatError::new(path, what).at(format!("texel {x}, {y} from the top left")));
     }
     Ok(map)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Cursor;
+    use std::path::PathBuf;
+    use tempfile::TempDir;
+
+    /// A file of the given content under a name that says nothing.
+    fn file(bytes: &[u8]) -> (TempDir, PathBuf) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("map.data");
+        std::fs::write(&path, bytes).unwrap();
+        (folder, path)
+    }
+
+    fn map(bytes: &[u8], channel: Channel, color: bool) -> Result<ReadMap, FormatError> {
+        read_map(&file(bytes).1, channel, color)
+    }
+
+    fn values(bytes: &[u8], channel: Channel) -> Vec<f32> {
+        let (_folder, path) = file(bytes);
+        read_map(&path, channel, false).unwrap().map.data
+    }
+
+    fn png(w: u32, h: u32, bytes: &[u8], kind: image::ExtendedColorType) -> Vec<u8> {
+        let mut out = Vec::new();
+        image::codecs::png::PngEncoder::new(&mut out).write_image(bytes, w, h, kind).unwrap();
+        out
+    }
+
+    fn tiff<C: tiff::encoder::colortype::ColorType>(w: u32, h: u32, data: &[C::Inner]) -> Vec<u8>
+    where
+        [C::Inner]: tiff::encoder::TiffValue,
+    {
+        let mut out = Cursor::new(Vec::new());
+        tiff::encoder::TiffEncoder::new(&mut out).unwrap().write_image::<C>(w, h, data).unwrap();
+        out.into_inner()
+    }
+
+    fn exr(w: usize, h: usize, channels: &[(&str, exr::prelude::FlatSamples)]) -> Vec<u8> {
+        use exr::prelude::*;
+        let list = channels.iter().map(|(name, v)| AnyChannel::new(*name, v.clone())).collect::<SmallVec<_>>();
+        let layer = Layer::new((w, h), LayerAttributes::default(), Encoding::FAST_LOSSLESS, AnyChannels::sort(list));
+        let mut out = Cursor::new(Vec::new());
+        Image::from_layer(layer).write().to_buffered(&mut out).unwrap();
+        out.into_inner()
+    }
+
+    const RGBA: [u8; 8] = [255, 0, 0, 51, 10, 20, 30, 255];
+
+    #[test]
+    fn png_of_every_kind() {
+        use image::ExtendedColorType as T;
+        // Two rows: the lower one comes first.
+        assert_eq!(values(&png(1, 2, &[0, 255], T::L8), Channel::Auto), [1.0, 0.0]);
+        assert_eq!(values(&png(1, 1, &[51, 102], T::La8), Channel::Auto), [0.2]);
+        assert_eq!(values(&png(1, 1, &[51, 102], T::La8), Channel::A), [0.4]);
+        let grey16: Vec<u8> = [0u16, 13107, 65535].iter().flat_map(|v| v.to_ne_bytes()).collect();
+        assert_eq!(values(&png(3, 1, &grey16, T::L16), Channel::R), [0.0, 0.2, 1.0]);
+        let rgba = png(2, 1, &RGBA, T::Rgba8);
+        assert_eq!(values(&rgba, Channel::R), [1.0, 10.0 / 255.0]);
+        assert_eq!(values(&rgba, Channel::G), [0.0, 20.0 / 255.0]);
+        assert_eq!(values(&rgba, Channel::B), [0.0, 30.0 / 255.0]);
+        assert_eq!(values(&rgba, Channel::A), [0.2, 1.0]);
+        assert_eq!(values(&rgba, Channel::Rgb).len(), 6);
+        assert_eq!(values(&rgba, Channel::Luminance)[0], 0.2126);
+        assert_eq!(values(&png(1, 1, &[51], T::L8), Channel::Rgb), [0.2; 3]);
+        let (_folder, path) = file(&rgba);
+        assert_eq!(read_size(&path).unwrap(), (2, 1));
+        let e = map(&png(1, 1, &[51], T::L8), Channel::A, false);
+        assert!(e.is_err());
+    }
+
+    #[test]
+    fn automatic_choice_of_the_channel() {
+        use image::ExtendedColorType as T;
+        let read = |bytes: &[u8]| {
+            let (_folder, path) = file(&png(1, 1, bytes, T::Rgb8));
+            read_map(&path, Channel::Auto, false).unwrap()
+        };
+        assert_eq!((read(&[255; 3]).map.data, read(&[255; 3]).warnings.len()), (vec![1.0], 0));
+        let coloured = read(&[255, 0, 0]);
+        assert_eq!((coloured.map.data, coloured.warnings.len()), (vec![0.2126], 1));
+    }
+
+    #[test]
+    fn colour_is_decoded_and_alpha_is_not() {
+        let (_folder, path) = file(&png(2, 1, &RGBA, image::ExtendedColorType::Rgba8));
+        let rgb = read_map(&path, Channel::Rgb, true).unwrap().map.data;
+        assert_eq!(rgb[..3], [1.0, 0.0, 0.0]);
+        assert!((rgb[3] - 0.003_035_27).abs() < 1e-7, "below the knee: 10 / 255 / 12.92");
+        assert!((rgb[5] - 0.012_983_03).abs() < 1e-7, "above it");
+        assert_eq!(read_map(&path, Channel::A, true).unwrap().map.data, [0.2, 1.0]);
+        let grey: Vec<u8> = 32768u16.to_ne_bytes().to_vec();
+        let (_folder, path) = file(&png(1, 1, &grey, image::ExtendedColorType::L16));
+        assert!((read_map(&path, Channel::Auto, true).unwrap().map.data[0] - 0.214_048).abs() < 1e-5);
+    }
+
+    #[test]
+    fn tiff_integers_and_floats() {
+        use tiff::encoder::colortype::{Gray8, Gray16, Gray32, Gray32Float, RGB8, RGB16, RGB32Float, RGBA8};
+        assert_eq!(values(&tiff::<Gray8>(1, 2, &[0, 51]), Channel::Auto), [0.2, 0.0]);
+        assert_eq!(values(&tiff::<Gray16>(2, 1, &[13107, 65535]), Channel::Auto), [0.2, 1.0]);
+        assert_eq!(values(&tiff::<Gray32Float>(2, 1, &[-3.5, 1e6]), Channel::Auto), [-3.5, 1e6]);
+        assert_eq!(values(&tiff::<RGB8>(1, 1, &[255, 51, 0]), Channel::G), [0.2]);
+        assert_eq!(values(&tiff::<RGB16>(1, 1, &[0, 0, 65535]), Channel::Rgb), [0.0, 0.0, 1.0]);
+        assert_eq!(values(&tiff::<RGB32Float>(1, 1, &[2.0, 3.0, 4.0]), Channel::B), [4.0]);
+        assert_eq!(values(&tiff::<RGBA8>(1, 1, &[0, 0, 0, 51]), Channel::A), [0.2]);
+        let (_folder, path) = file(&tiff::<Gray8>(3, 2, &[0; 6]));
+        assert_eq!(read_size(&path).unwrap(), (3, 2));
+        let (_folder, path) = file(&tiff::<Gray32>(1, 1, &[7]));
+        assert!(read_map(&path, Channel::Auto, false).unwrap_err().what.contains("32 bits"));
+    }
+
+    #[test]
+    fn exr_channels_by_name() {
+        use exr::prelude::{FlatSamples, f16};
+        let half = |v: &[f32]| FlatSamples::F16(v.iter().map(|x| f16::from_f32(*x)).collect());
+        let float = |v: &[f32]| FlatSamples::F32(v.to_vec());
+        assert_eq!(values(&exr(1, 2, &[("Y", half(&[0.5, 2.0]))]), Channel::Auto), [2.0, 0.5]);
+        assert_eq!(values(&exr(2, 1, &[("length", FlatSamples::U32(vec![7, 70000]))]), Channel::Auto), [7.0, 70000.0]);
+        let rgba = [("A", half(&[0.25])), ("B", float(&[3.0])), ("G", float(&[2.0])), ("R", float(&[1.0]))];
+        assert_eq!(values(&exr(1, 1, &rgba), Channel::Rgb), [1.0, 2.0, 3.0]);
+        assert_eq!(values(&exr(1, 1, &rgba), Channel::A), [0.25]);
+        assert_eq!(values(&exr(1, 1, &rgba), Channel::G), [2.0]);
+        let (_folder, path) = file(&exr(1, 1, &rgba));
+        let auto = read_map(&path, Channel::Auto, false).unwrap();
+        assert_eq!((auto.map.data, auto.warnings.len()), (vec![0.2126 + 0.7152 * 2.0 + 0.0722 * 3.0], 1));
+        let layered = [("hair.B", float(&[3.0])), ("hair.G", float(&[2.0])), ("hair.R", float(&[1.0]))];
+        assert_eq!(values(&exr(1, 1, &layered), Channel::Rgb), [1.0, 2.0, 3.0]);
+        let (_folder, path) = file(&exr(1, 1, &[("t0", float(&[1.0])), ("t1", float(&[1.0]))]));
+        assert!(read_map(&path, Channel::Auto, false).unwrap_err().what.contains("its channels: t0, t1"));
+        assert_eq!(read_size(&path).unwrap(), (1, 1));
+    }
+
+    #[test]
+    fn exr_data_window_is_laid_into_the_display_window() {
+        use exr::prelude::*;
+        let list: SmallVec<_> =
+            [AnyChannel::new("Y", FlatSamples::F32(vec![1.0, 2.0, 3.0, 4.0]))].into_iter().collect();
+        let attributes = LayerAttributes { layer_position: Vec2(1, -1), ..LayerAttributes::default() };
+        let layer = Layer::new((2, 2), attributes, Encoding::UNCOMPRESSED, AnyChannels::sort(list));
+        let mut image = Image::from_layer(layer);
+        image.attributes.display_window = IntegerBounds::new((0, 0), (2, 2));
+        let mut out = Cursor::new(Vec::new());
+        image.write().to_buffered(&mut out).unwrap();
+        let (_folder, path) = file(&out.into_inner());
+        let read = read_map(&path, Channel::Auto, false).unwrap();
+        assert_eq!(read.map.data, [0.0, 0.0, 0.0, 3.0]);
+        assert_eq!(read.warnings.len(), 1);
+    }
+
+    #[test]
+    fn texels_that_are_no_numbers_are_named() {
+        use exr::prelude::FlatSamples;
+        let (_folder, path) = file(&exr(2, 2, &[("Y", FlatSamples::F32(vec![0.0, 0.0, f32::NAN, 0.0]))]));
+        let e = read_map(&path, Channel::Auto, false).unwrap_err().to_string();
+        assert!(e.contains("(texel 0, 1 from the top left): a value is NaN"), "{e}");
+        let bytes = tiff::<tiff::encoder::colortype::Gray32Float>(2, 1, &[0.0, f32::INFINITY]);
+        let (_folder, path) = file(&bytes);
+        assert!(read_map(&path, Channel::Auto, false).unwrap_err().to_string().contains("(texel 1, 0"));
+    }
+
+    #[test]
+    fn broken_foreign_and_huge_files_are_errors() {
+        let error = |bytes: &[u8]| {
+            let (_folder, path) = file(bytes);
+            assert!(read_size(&path).is_err() || read_map(&path, Channel::Auto, false).is_err());
+            read_map(&path, Channel::Auto, false).unwrap_err().what
+        };
+        let noise: Vec<u8> = (0..40 * 40u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+        let sources = [
+            png(40, 40, &noise, image::ExtendedColorType::L8),
+            tiff::<tiff::encoder::colortype::Gray8>(40, 40, &noise),
+            exr(40, 40, &[("Y", exr::prelude::FlatSamples::F32(noise.iter().map(|b| f32::from(*b)).collect()))]),
+        ];
+        for whole in &sources {
+            for cut in [4, 20, 60, whole.len() / 2, whole.len() - 100] {
+                assert!(!error(&whole[..cut]).is_empty());
+            }
+        }
+        let mut flipped = sources[0].clone();
+        flipped[900] ^= 1;
+        assert!(error(&flipped).contains("cannot be decoded"));
+        assert!(error(&[0xff, 0xd8, 0xff, 0xe0, 0, 0, 0, 0]).contains("the content is JPG"));
+        assert!(error(b"").contains("empty"));
+        assert!(error(b"hello").contains("neither PNG nor TIFF nor OpenEXR"));
+        // A PNG header that claims 20000 x 2 texels, with a right checksum.
+        let wide = png(20000, 2, &[0; 40000], image::ExtendedColorType::L8);
+        assert!(error(&wide).contains("at most 16384 x 16384"));
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out.png");
+        write_png(&path, 1, 2, &[255, 0, 0, 0, 51, 0]).unwrap();
+        assert_eq!(read_map(&path, Channel::Rgb, false).unwrap().map.data, [0.0, 0.2, 0.0, 1.0, 0.0, 0.0]);
+        write_png_gray16(&path, 2, 1, &[13107, 1]).unwrap();
+        assert_eq!(read_map(&path, Channel::Auto, false).unwrap().map.data, [0.2, 1.0 / 65535.0]);
+        assert!(write_png(&path, 2, 2, &[0; 3]).is_err());
+        assert!(
+            write_png(&folder.path().join("no/such/folder.png"), 1, 1, &[0; 3])
+                .unwrap_err()
+                .what
+                .contains("cannot be written")
+        );
+    }
 }

@@ -6,7 +6,7 @@ use super::{Step, What, groom, instance, interpolate};
 use crate::Error;
 use crate::config::{ExportFormat, UpAxis};
 use crate::files::unfinished;
-use crate::format::{HairFrame, HairLayer, ShotFacts, mcap::McapHair, ply, usd::UsdHair};
+use crate::format::{FormatError, HairFrame, HairLayer, ShotFacts, mcap::McapHair, ply, usd::UsdHair};
 use pelage_geom::Offsets;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -137,7 +137,7 @@ pub fn write(run: &mut Runner<'_>, what: What, format: ExportFormat) -> Result<(
         ExportFormat::Ply => frames(run, &facts, |frame, hair| {
             let part = parts.add(&out, format!("hair.{frame:04}.ply"));
             ply::write_hair(&part, &facts, &layers, hair)?;
-            ply::verify_hair(&part, &layers, hair)?;
+            verify_ply(&part, &layers, hair)?;
             Ok(())
         })?,
     }
@@ -173,4 +173,14 @@ fn frames(
         now = next.unwrap_or_default();
     }
     Ok(())
+}
+
+/// Reads a PLY file back: ids, counts and positions must be what was written.
+fn verify_ply(path: &Path, layers: &[HairLayer], hair: &[HairFrame<'_>]) -> Result<(), Error> {
+    let read = ply::read_curves(path)?.strands;
+    let same = read.id.iter().eq(layers.iter().flat_map(|l| &l.id))
+        && read.offsets.counts().eq(layers.iter().flat_map(|l| l.offsets.counts()))
+        && read.position.iter().eq(hair.iter().flat_map(|h| h.position));
+    let what = "is not what was exported when read back";
+    if same { Ok(()) } else { Err(FormatError::new(path, what).hint("export it again").into()) }
 }

@@ -57,6 +57,7 @@ pub struct Runner<'a> {
     pub warnings: Vec<String>,
     pub(super) skin: Option<Rc<skin::Skin>>,
     pub(super) layers: BTreeMap<usize, Rc<super::interpolate::LayerHairs>>,
+    pub(super) placed: Option<pelage_groom::control::ControlHairs>,
     pub(super) control: Option<Rc<pelage_groom::control::ControlHairs>>,
     hashes: RefCell<FileHashes>,
     options: Options,
@@ -86,6 +87,7 @@ impl<'a> Runner<'a> {
             warnings: Vec::new(),
             skin: None,
             layers: BTreeMap::new(),
+            placed: None,
             control: None,
             hashes: RefCell::new(FileHashes::open(&cache)),
             options,
@@ -228,8 +230,10 @@ impl<'a> Runner<'a> {
         for step in steps.iter().filter(|s| !waiting.contains(&s.what)) {
             last.insert(step.name.clone(), step.recipe.clone());
         }
-        let ran: Vec<&Step> = todo.iter().filter(|s| self.ran.contains_key(&s.what)).collect();
-        (report.ran, report.reused) = tally(stage, &ran, &done);
+        // A step may turn out to be finished: another of this run had the same recipe.
+        let (ran, found): (Vec<&Step>, Vec<&Step>) = todo.iter().partition(|s| self.ran.contains_key(&s.what));
+        let found = found.into_iter().filter(|s| !waiting.contains(&s.what));
+        (report.ran, report.reused) = tally(stage, &ran, &done.iter().chain(found).collect::<Vec<_>>());
         for step in &steps {
             self.add_counts(step, &mut report.counts);
         }
@@ -278,7 +282,7 @@ impl<'a> Runner<'a> {
 }
 
 /// Steps as the report counts them: frames for interpolation, files for export and preview, else the stage as one.
-fn tally(stage: Stage, ran: &[&Step], done: &[Step]) -> (usize, usize) {
+fn tally(stage: Stage, ran: &[&Step], done: &[&Step]) -> (usize, usize) {
     match stage {
         Stage::Groom | Stage::Instance => (usize::from(!ran.is_empty()), usize::from(ran.is_empty())),
         Stage::Interpolate => {
@@ -287,7 +291,7 @@ fn tally(stage: Stage, ran: &[&Step], done: &[Step]) -> (usize, usize) {
                 _ => None,
             };
             let new: BTreeSet<i32> = ran.iter().filter_map(|s| frame(s)).collect();
-            let old: BTreeSet<i32> = done.iter().filter_map(frame).filter(|f| !new.contains(f)).collect();
+            let old: BTreeSet<i32> = done.iter().filter_map(|s| frame(s)).filter(|f| !new.contains(f)).collect();
             (new.len(), old.len())
         }
         Stage::Export | Stage::Preview => (ran.len(), done.len()),

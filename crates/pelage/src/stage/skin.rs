@@ -105,6 +105,6 @@ pub fn read_map(tiles: &[(u32, InputFile)], m: &MapRef, rgb: bool) -> Result<Til
         WrapMode::Clamp => Wrap::Clamp,
         WrapMode::Repeat => Wrap::Repeat,
     };
-    let read = |(number, file): &(u32, InputFile)| Ok((*number, image::read_map(&file.path, channel, false)?));
+    let read = |(number, file): &(u32, InputFile)| Ok((*number, image::read_map(&file.path, channel, rgb)?.map));
     Ok(TiledMap { tiles: tiles.iter().map(read).collect::<Result<_, Error>>()?, wrap })
 }

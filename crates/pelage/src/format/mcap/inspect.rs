@@ -146,9 +146,8 @@ impl Scan {
                 *channel = McapChannel { topic: c.topic, encoding: c.encoding, schema, schema_encoding, ..*channel };
             }
             Record::Message(m) => {
-                let Some(channel) = summary.channels.get_mut(&m.channel) else {
-                    return Err(format!("a message belongs to channel {}, which is not described", m.channel));
-                };
+                // A channel may be described only in the summary, or nowhere: its messages are counted all the same.
+                let channel = summary.channels.entry(m.channel).or_default();
                 channel.messages += 1;
                 channel.bytes += m.data.len() as u64;
                 summary.messages += 1;

@@ -86,44 +86,58 @@ impl HairMcap {
     /// What does not change over the shot, of layer `layer` (panics if there is no such layer).
     pub fn layer(&mut self, layer: usize) -> Result<HairLayer, FormatError> {
         let place = self.layers[layer].topology[0];
-        let (_, message) = self.message(layer, place, "topology")?;
-        let read = proto::decode_layer(&message).map_err(|e| self.bad(layer, "topology", e))?;
-        let (curves, points) = (read.offsets.len(), read.offsets.total());
-        let sized = [read.id.len(), read.root_uv.len(), read.color.len(), read.opacity.len()];
-        let skin = [read.skin_face.len(), read.skin_bary.len()];
-        if sized.iter().any(|&n| n != curves) || read.width.len() != points || (skin != [curves; 2] && skin != [0; 2]) {
-            return Err(self.bad(layer, "topology", "its columns differ in length".into()));
-        }
-        Ok(read)
+        self.message(layer, place, "topology", |_, message| {
+            let read = proto::decode_layer(message)?;
+            let (curves, points) = (read.offsets.len(), read.offsets.total());
+            let sized = [read.id.len(), read.root_uv.len(), read.color.len(), read.opacity.len()];
+            let skin = [read.skin_face.len(), read.skin_bary.len()];
+            let wrong = sized.iter().any(|&n| n != curves) || read.width.len() != points;
+            if wrong || (skin != [curves; 2] && skin != [0; 2]) {
+                return Err("its columns differ in length".into());
+            }
+            Ok(read)
+        })
     }
 
     /// Layer `layer` at the frame with place `index` among the frames of the facts (panics if there are no such).
     pub fn frame(&mut self, index: usize, layer: usize) -> Result<McapFrame, FormatError> {
         let number = self.facts.frames[index];
-        let what = format!("frame {number}");
         let place = self.layers[layer].frames[index];
-        let (sequence, message) = self.message(layer, place, &what)?;
-        let read = proto::decode_frame(&message).map_err(|e| self.bad(layer, &what, e))?;
-        let origin: Result<[f64; 3], _> = read.origin.try_into();
-        match origin {
-            Ok(origin) if read.frame == number && sequence == number as u32 && read.position.len() == read.velocity.len() => {
-                Ok(McapFrame { frame: number, time: read.time, origin, position: read.position, velocity: read.velocity })
+        self.message(layer, place, &format!("frame {number}"), |sequence, message| {
+            let read = proto::decode_frame(message)?;
+            let sized = read.position.len() == read.velocity.len();
+            match read.origin.try_into() {
+                Ok(origin) if read.frame == number && sequence == number as u32 && sized => Ok(McapFrame {
+                    frame: number,
+                    time: read.time,
+                    origin,
+                    position: read.position,
+                    velocity: read.velocity,
+                }),
+                _ => Err("its number, origin or sizes are wrong".into()),
             }
-            _ => Err(self.bad(layer, &what, "its number, origin or sizes are wrong".into())),
-        }
+        })
     }
 
-    fn bad(&self, layer: usize, what: &str, error: Broken) -> FormatError {
-        FormatError::new(&self.path, error).at(format!("layer {:?}, {what}", self.layers[layer].name))
-    }
-
-    /// Sequence number and bytes of a message.
-    fn message(&mut self, layer: usize, place: Place, what: &str) -> Result<(u32, Vec<u8>), FormatError> {
-        message_at(&mut self.file, self.len, place).map_err(|e| self.bad(layer, what, e))
+    /// Decodes a message with `decode`, which is given its sequence number and its bytes.
+    fn message<T>(
+        &mut self,
+        layer: usize,
+        place: Place,
+        what: &str,
+        decode: impl FnOnce(u32, &[u8]) -> Result<T, Broken>,
+    ) -> Result<T, FormatError> {
+        message_at(&mut self.file, self.len, place, decode)
+            .map_err(|e| FormatError::new(&self.path, e).at(format!("layer {:?}, {what}", self.layers[layer].name)))
     }
 }
 
-fn message_at(file: &mut File, len: u64, place: Place) -> Result<(u32, Vec<u8>), Broken> {
+fn message_at<T>(
+    file: &mut File,
+    len: u64,
+    place: Place,
+    decode: impl FnOnce(u32, &[u8]) -> Result<T, Broken>,
+) -> Result<T, Broken> {
     let (code, body) = record_at(file, len, place.chunk)?;
     let Record::Chunk(chunk) = record::parse(code, &body)? else { return Err("the index leads to no chunk".into()) };
     let records = chunk.records()?;
@@ -131,7 +145,7 @@ fn message_at(file: &mut File, len: u64, place: Place) -> Result<(u32, Vec<u8>),
     input.take(place.offset)?;
     let Some((code, body)) = record::next(&mut input)? else { return Err("the index leads to no message".into()) };
     match record::parse(code, body)? {
-        Record::Message(m) if m.log_time == place.log_time => Ok((m.sequence, m.data.to_vec())),
+        Record::Message(m) if m.log_time == place.log_time => decode(m.sequence, m.data),
         _ => Err("the index leads to another message".into()),
     }
 }

@@ -176,7 +176,7 @@ pub fn parse_curves(path: &Path, bytes: &[u8]) -> Result<Curves, FormatError> {
             source.skip(element)?;
         }
     }
-    let mut warnings: Vec<String> = source.trailing().into_iter().collect();
+    let mut warnings = source.leftovers();
     if layout(curve) == Some(Layout::Edges) {
         rows = chains(path, &rows.index, points.position.len())?;
     }
@@ -445,3 +445,6 @@ fn origin(comments: &[String], position: &[[f64; 3]]) -> [f64; 3] {
     let far = length(middle) > 64.0 * length(std::array::from_fn(|i| hi[i] - lo[i]));
     if far { middle } else { [0.0; 3] }
 }
+
+#[cfg(test)]
+mod tests;

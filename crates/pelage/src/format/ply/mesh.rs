@@ -52,7 +52,7 @@ pub fn parse_mesh(path: &Path, bytes: &[u8]) -> Result<ReadMesh, FormatError> {
             _ => source.skip(element)?,
         }
     }
-    warnings.extend(source.trailing());
+    warnings.extend(source.leftovers());
     warnings.extend(vertices.warning.take());
     let mesh = assemble(path, vertices.position, &vertices.uv, &mut faces, &mut warnings)?;
     let named = |e: &ElementDef| e.name == "vertex" && ["nx", "ny", "nz"].iter().all(|n| e.properties.contains_key(*n));
@@ -86,11 +86,11 @@ fn parse_positions(
         let what = format!("has {found} vertices, the rest pose has {vertices}");
         return Err(FormatError::new(path, what).hint(hint));
     }
-    if let (Some(found), Some(expected)) = (count("face").filter(|n| *n > 0), faces) {
-        if found != expected {
-            let what = format!("has {found} faces, the rest pose has {expected}");
-            return Err(FormatError::new(path, what).hint(hint));
-        }
+    if let (Some(found), Some(expected)) = (count("face").filter(|n| *n > 0), faces)
+        && found != expected
+    {
+        let what = format!("has {found} faces, the rest pose has {expected}");
+        return Err(FormatError::new(path, what).hint(hint));
     }
     for element in &elements {
         if element.name == "vertex" {
@@ -324,3 +324,6 @@ fn corner_uvs(vertex_uv: &[[f32; 2]], faces: &mut Faces, vertices: usize) -> usi
     }
     missing
 }
+
+#[cfg(test)]
+mod tests;

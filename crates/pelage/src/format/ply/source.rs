@@ -3,7 +3,7 @@
 //! The header is cleaned before it is parsed (line ends of any kind, comments in any encoding, odd names of properties
 //! that nobody reads), because the parser is strict about things that old exporters are not. Rows of binary files are
 //! parsed as they are. Rows of ascii files are reduced to the wanted values first, so that "nan" in a column that
-//! nobody reads, ".5", values over several lines and comments of line length do no harm.
+//! nobody reads, ".5", and values over several lines do no harm.
 
 use super::row::Row;
 use crate::format::FormatError;
@@ -28,6 +28,8 @@ pub(super) struct Source<'a> {
     line: usize,
     /// Scratch: the wanted values of one ascii row.
     row: String,
+    /// Ascii rows with more values than the header declares, and the line of the first.
+    long_rows: (usize, usize),
 }
 
 /// Which properties of an element are wanted, and under which one-letter slot [`Row`] keeps them.
@@ -66,7 +68,7 @@ impl<'a> Source<'a> {
                 }
             }
         }
-        Ok(Source { path, header, payload: &bytes[start..], line: lines + 1, row: String::new() })
+        Ok(Source { path, header, payload: &bytes[start..], line: lines + 1, row: String::new(), long_rows: (0, 0) })
     }
 
     /// How many rows of `element` to make room for: what the header says, or fewer if the file cannot hold them.
@@ -80,7 +82,7 @@ impl<'a> Source<'a> {
                 PropertyType::Scalar(s) | PropertyType::List(s, _) => size(s),
             })
             .sum();
-        if least == 0 { 0 } else { element.count.min(self.payload.len() / least + 1) }
+        self.payload.len().checked_div(least).map_or(0, |rows| element.count.min(rows + 1))
     }
 
     /// Reads all rows of `element`, which must be the next one of the file, and hands them to `each` with their index.
@@ -140,11 +142,17 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Warning about bytes after the last element, if there are any but white space.
-    pub fn trailing(&self) -> Option<String> {
-        let rest = self.payload;
-        let blank = rest.iter().all(u8::is_ascii_whitespace);
-        (!blank).then(|| format!("{} bytes after the last element were ignored", rest.len()))
+    /// What of the file was passed over, in words: bytes after the last element, values after the last property.
+    pub fn leftovers(&self) -> Vec<String> {
+        let rest = self.payload.trim_ascii_start().len();
+        let bytes = (rest > 0).then(|| format!("{rest} bytes after the last element were ignored"));
+        let (rows, line) = self.long_rows;
+        let values = (rows > 0).then(|| {
+            format!(
+                "{rows} lines have more values than the header declares, which were ignored (the first is line {line})"
+            )
+        });
+        bytes.into_iter().chain(values).collect()
     }
 
     /// "vertex 7", with the line in ascii files.
@@ -163,6 +171,8 @@ impl<'a> Source<'a> {
     /// Copies the wanted values of the next ascii row into `self.row`.
     fn ascii_row(&mut self, element: &ElementDef, plan: &Plan, i: usize) -> Result<(), FormatError> {
         self.row.clear();
+        self.pass_blanks();
+        let first_line = self.line;
         for (p, &wanted) in element.properties.values().zip(&plan.wanted) {
             let values = match p.data_type {
                 PropertyType::Scalar(_) => 1,
@@ -190,12 +200,19 @@ impl<'a> Source<'a> {
                 }
             }
         }
-        let rest = self.payload.iter().find(|b| !matches!(b, b' ' | b'\t'));
-        if rest.is_some_and(|b| !matches!(b, b'\n' | b'\r')) {
+        let end = self.payload.iter().position(|b| matches!(b, b'\n' | b'\r')).unwrap_or(self.payload.len());
+        let (rest, next) = self.payload.split_at(end);
+        if rest.trim_ascii().is_empty() {
+            return Ok(());
+        }
+        // On one line these are values that the header forgot. Over several, a value is missing.
+        if first_line != self.line {
             let names: Vec<&str> = element.properties.keys().map(String::as_str).collect();
             let what = format!("more values on the line than the element has ({})", names.join(" "));
             return Err(FormatError::new(self.path, what).at(self.place(element, i)));
         }
+        self.payload = next;
+        self.long_rows = (self.long_rows.0 + 1, if self.long_rows.0 == 0 { self.line } else { self.long_rows.1 });
         Ok(())
     }
 
@@ -203,8 +220,8 @@ impl<'a> Source<'a> {
         format!("{}, property {}", self.place(element, row), p.name)
     }
 
-    /// The next word of an ascii payload.
-    fn token(&mut self) -> Option<&'a [u8]> {
+    /// Moves to the next word of an ascii payload and counts the lines on the way.
+    fn pass_blanks(&mut self) {
         let mut at = 0;
         while at < self.payload.len() && self.payload[at].is_ascii_whitespace() {
             let next = self.payload.get(at + 1);
@@ -213,10 +230,16 @@ impl<'a> Source<'a> {
             }
             at += 1;
         }
-        let rest = &self.payload[at..];
-        let end = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
-        self.payload = &rest[end..];
-        (end > 0).then_some(&rest[..end])
+        self.payload = &self.payload[at..];
+    }
+
+    /// The next word of an ascii payload.
+    fn token(&mut self) -> Option<&'a [u8]> {
+        self.pass_blanks();
+        let end = self.payload.iter().position(u8::is_ascii_whitespace).unwrap_or(self.payload.len());
+        let (word, rest) = self.payload.split_at(end);
+        self.payload = rest;
+        (end > 0).then_some(word)
     }
 }
 
@@ -403,4 +426,122 @@ fn not_ply(path: &Path, bytes: &[u8]) -> FormatError {
         _ => "not a PLY file: it does not start with the line 'ply'",
     };
     FormatError::new(path, kind).hint("export it as PLY, ascii or binary")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::mesh::parse_mesh;
+    use super::super::samples::quads;
+    use super::*;
+
+    fn mesh(bytes: &[u8]) -> Result<super::super::ReadMesh, FormatError> {
+        parse_mesh(Path::new("s.ply"), bytes)
+    }
+
+    /// `file` with text replaced in its header.
+    fn edited(file: &[u8], from: &str, to: &[u8]) -> Vec<u8> {
+        let at = file.windows(from.len()).position(|w| w == from.as_bytes()).unwrap();
+        [&file[..at], to, &file[at + from.len()..]].concat()
+    }
+
+    fn with_line_ends(file: &[u8], end: &str, all: bool) -> Vec<u8> {
+        let mark = b"end_header\n";
+        let split = file.windows(mark.len()).position(|w| w == mark).unwrap() + mark.len();
+        let change = |part: &[u8]| String::from_utf8(part.to_vec()).unwrap().replace('\n', end).into_bytes();
+        let tail = if all { change(&file[split..]) } else { file[split..].to_vec() };
+        [change(&file[..split]), tail].concat()
+    }
+
+    #[test]
+    fn line_ends_of_every_machine() {
+        for end in ["\r\n", "\r"] {
+            let ascii = quads("ascii");
+            assert_eq!(mesh(&with_line_ends(&ascii, end, true)).unwrap(), mesh(&ascii).unwrap());
+            for binary in [quads("binary_little_endian"), quads("binary_big_endian")] {
+                assert_eq!(mesh(&with_line_ends(&binary, end, false)).unwrap(), mesh(&binary).unwrap());
+            }
+        }
+        // Old Mac header, and a payload that starts with a line feed.
+        let text = "ply\rformat binary_little_endian 1.0\relement vertex 3\rproperty uchar x\rproperty uchar y\rproperty uchar z\relement face 1\rproperty list uchar uchar vertex_indices\rend_header\r";
+        let m = mesh(&[text.as_bytes(), &[10, 0, 0, 0, 1, 0, 0, 0, 1, 3, 0, 1, 2]].concat()).unwrap();
+        assert_eq!(m.mesh.position[0], [10.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn headers_that_old_exporters_write() {
+        for file in [quads("ascii"), quads("binary_little_endian")] {
+            let want = mesh(&file).unwrap();
+            let same = |bytes: Vec<u8>| assert_eq!(mesh(&bytes).unwrap(), want);
+            same(edited(&file, "comment by hand", b"comment Caf\xe9 \xff\xfe"));
+            same(edited(&file, "comment by hand", b"obj_info num_cols 5\ncomment\n\ncomment  \t x"));
+            same(edited(&file, "property float x", b"property  float\tx "));
+            same([b"\xef\xbb\xbf", &file[..]].concat());
+        }
+        let odd = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float 2nd.value\nproperty float 2nd-value\nproperty float x\nproperty float y\nproperty float z\nelement my.thing 1\nproperty int a\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n9 9 0 0 0\n9 9 1 0 0\n9 9 0 1 0\n5\n3 0 1 2";
+        assert_eq!(mesh(odd.as_bytes()).unwrap().mesh.position[1], [1.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn broken_headers_are_named_by_line() {
+        let file = quads("ascii");
+        let error = |from: &str, to: &str| mesh(&edited(&file, from, to.as_bytes())).unwrap_err().to_string();
+        assert!(error("property float y", "property float x").contains("(line 6): property 'x' is declared twice"));
+        assert!(error("element face", "element vertex").contains("element 'vertex' is declared twice"));
+        assert!(
+            error("property float y", "property flaot y")
+                .contains("(line 6): 'property flaot y' is not a line of a PLY header")
+        );
+        assert!(error("element vertex 6", "element vertex six").contains("(line 4)"));
+        assert!(error("element vertex 6", "property float q\nelement vertex 6").contains("without preceding element"));
+        assert!(error("format ascii 1.0\n", "").contains("No format line"));
+        assert!(error("end_header", "end_head").contains("(line "));
+        assert!(error("list uchar int", "list float int").contains("must be an integer type"));
+        assert!(error("ply\n", "plyx\n").contains("(line 1)"));
+        let start = |bytes: &[u8]| mesh(bytes).unwrap_err().what;
+        assert!(start(b"").contains("empty"));
+        assert!(start(b"\x1f\x8b\x08").contains("gzip"));
+        assert!(start(b"v 0 0 0\n").contains("OBJ"));
+        assert!(start(b"solid x").contains("not a PLY file"));
+        assert!(start(b"ply\nformat ascii 1.0\nelement vertex 3\n").contains("'end_header' is missing"));
+        assert!(start(b"ply\nformat ascii 1.0\nend_header").contains("no element 'vertex'"));
+    }
+
+    #[test]
+    fn ascii_numbers_in_every_spelling() {
+        let spelled = |text: &str| {
+            let mut row = String::new();
+            push_value(&mut row, text.as_bytes()).then_some(row)
+        };
+        for (text, want) in [
+            ("1", "1"),
+            (".5", "0.5"),
+            ("-.5e3", "-0.5e3"),
+            ("+7.", "7"),
+            ("1.e-3", "1e-3"),
+            ("-0.25E+2", "-0.25E+2"),
+            ("034", "034"),
+        ] {
+            assert_eq!(spelled(text).as_deref(), Some(want));
+            assert_eq!(spelled(text).unwrap().parse::<f64>().ok(), text.parse::<f64>().ok());
+        }
+        for text in ["", ".", "-", "e5", "1e", "1e+", "1.2.3", "0x10", "nan", "inf", "1,5", "--1", "1f"] {
+            assert_eq!(spelled(text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn ascii_rows_over_several_lines_and_rows_that_are_too_long() {
+        let head = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty int z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
+        let m = mesh(format!("{head}\n0 0\n0\n\n 1. .5 2.0 \n0 1\t3\n\n3 0 1\n2").as_bytes()).unwrap();
+        assert_eq!(m.mesh.position, [[0.0; 3], [1.0, 0.5, 2.0], [0.0, 1.0, 3.0]]);
+        let e = mesh(format!("{head}0 0 0\n1 0\n0 1 0\n0 0 0\n3 0 1 2\n").as_bytes()).unwrap_err().to_string();
+        assert!(e.contains("(line 12, vertex 1): more values on the line than the element has (x y z)"), "{e}");
+        let m = mesh(format!("{head}0 0 0\n1 0 0 7 7\n0 1 0\n3 0 1 2 8\n").as_bytes()).unwrap();
+        assert_eq!(m.mesh.triangle, [[0, 1, 2]]);
+        assert!(m.warnings[0].contains("2 lines have more values") && m.warnings[0].contains("line 11"), "{m:?}");
+        let e = mesh(format!("{head}0 0 0\n1 0 0\n0 1 0\n3 0 1.5 2\n").as_bytes()).unwrap_err().to_string();
+        assert!(e.contains("face 0") && e.contains("'3 0 1.5 2' does not fit"), "{e}");
+        let e = mesh(format!("{head}0 0 0\n1 0 0\n0 1 0\n-3 0 1 2\n").as_bytes()).unwrap_err().to_string();
+        assert!(e.contains("'-3' is not the length of a list"), "{e}");
+    }
 }

@@ -170,14 +170,11 @@ impl PropertyAccess for Cursor<'_> {
 /// A row of a table as the PLY parser fills it: the bits of each value.
 struct Bits<const N: usize>([u64; N]);
 
-macro_rules! set {
-    ($($name:ident $t:ty, $bits:expr;)*) => {
-        $(fn $name(&mut self, slot: &str, v: $t) -> PropertyAccessResult {
-            let bits: fn($t) -> u64 = $bits;
-            self.0[slot_index(slot)] = bits(v);
-            PropertyAccessResult::Set
-        })*
-    };
+impl<const N: usize> Bits<N> {
+    fn set(&mut self, slot: &str, bits: u64) -> PropertyAccessResult {
+        self.0[slot_index(slot)] = bits;
+        PropertyAccessResult::Set
+    }
 }
 
 impl<const N: usize> PropertyAccess for Bits<N> {
@@ -185,15 +182,36 @@ impl<const N: usize> PropertyAccess for Bits<N> {
         Bits([0; N])
     }
 
-    set! {
-        set_float f32, |v| u64::from(v.to_bits());
-        set_double f64, f64::to_bits;
-        set_uint u32, u64::from;
-        set_ushort u16, u64::from;
-        set_uchar u8, u64::from;
-        set_int i32, |v| u64::from(v as u32);
-        set_short i16, |v| u64::from(i32::from(v) as u32);
-        set_char i8, |v| u64::from(i32::from(v) as u32);
+    fn set_float(&mut self, slot: &str, v: f32) -> PropertyAccessResult {
+        self.set(slot, u64::from(v.to_bits()))
+    }
+
+    fn set_double(&mut self, slot: &str, v: f64) -> PropertyAccessResult {
+        self.set(slot, v.to_bits())
+    }
+
+    fn set_uint(&mut self, slot: &str, v: u32) -> PropertyAccessResult {
+        self.set(slot, u64::from(v))
+    }
+
+    fn set_ushort(&mut self, slot: &str, v: u16) -> PropertyAccessResult {
+        self.set(slot, u64::from(v))
+    }
+
+    fn set_uchar(&mut self, slot: &str, v: u8) -> PropertyAccessResult {
+        self.set(slot, u64::from(v))
+    }
+
+    fn set_int(&mut self, slot: &str, v: i32) -> PropertyAccessResult {
+        self.set(slot, u64::from(v as u32))
+    }
+
+    fn set_short(&mut self, slot: &str, v: i16) -> PropertyAccessResult {
+        self.set(slot, u64::from(i32::from(v) as u32))
+    }
+
+    fn set_char(&mut self, slot: &str, v: i8) -> PropertyAccessResult {
+        self.set(slot, u64::from(i32::from(v) as u32))
     }
 }
 
@@ -263,7 +281,7 @@ pub fn parse_tables(path: &Path, bytes: &[u8]) -> Result<Tables, FormatError> {
     for element in &elements {
         tables.tables.push(read_table(&mut source, element)?);
     }
-    match source.trailing() {
+    match source.leftovers().first() {
         Some(what) => Err(FormatError::new(path, what.replace("were ignored", "belong to no table"))),
         None => Ok(tables),
     }

@@ -194,7 +194,9 @@ fn floats_at(file: &mut CrateFile, attribute: Node, arity: usize, frame: Option<
     if let Some((rep, w)) = pick.high {
         let high = file.floats(rep, arity)?;
         if high.len() == low.len() {
-            low.iter_mut().zip(high).for_each(|(a, b)| *a = (f64::from(*a) + w * (f64::from(b) - f64::from(*a))) as f32);
+            low.iter_mut()
+                .zip(high)
+                .for_each(|(a, b)| *a = (f64::from(*a) + w * (f64::from(b) - f64::from(*a))) as f32);
         }
     }
     Ok(Some(low))
@@ -263,12 +265,24 @@ impl Columns<'_> {
     }
 }
 
-fn read_prim(file: &mut CrateFile, prim: Node, path: String, frame: Option<f64>, stage: &UsdStage) -> Result<UsdCurves> {
+fn read_prim(
+    file: &mut CrateFile,
+    prim: Node,
+    path: String,
+    frame: Option<f64>,
+    stage: &UsdStage,
+) -> Result<UsdCurves> {
     let place = |e: FormatError| if e.at.is_none() { e.at(path.clone()) } else { e };
     read_columns(file, prim, &path, frame, stage).map_err(place)
 }
 
-fn read_columns(file: &mut CrateFile, prim: Node, path: &str, frame: Option<f64>, stage: &UsdStage) -> Result<UsdCurves> {
+fn read_columns(
+    file: &mut CrateFile,
+    prim: Node,
+    path: &str,
+    frame: Option<f64>,
+    stage: &UsdStage,
+) -> Result<UsdCurves> {
     let token = |name: &str, fallback: &str| -> Result<String> {
         let rep = file.attribute(prim, name).and_then(|a| file.field(a, "default"));
         rep.map_or(Ok(fallback.to_owned()), |r| file.text(r))
@@ -280,7 +294,8 @@ fn read_columns(file: &mut CrateFile, prim: Node, path: &str, frame: Option<f64>
     };
     let mut notes = vec![];
     if kind != "linear" && basis != "catmullRom" {
-        notes.push(format!("the basis is {basis}: the points are control points, the curve does not pass through them"));
+        notes
+            .push(format!("the basis is {basis}: the points are control points, the curve does not pass through them"));
     }
     if kind != "linear" && basis == "catmullRom" && wrap == "nonperiodic" {
         notes.push("the curves are not pinned: they are drawn from their second to their last but one point".into());
@@ -367,5 +382,73 @@ fn place_in_scene(curves: &mut UsdCurves, m: &Matrix) {
     let lengths = m.map(|row| row[0] * row[0] + row[1] * row[1] + row[2] * row[2]);
     if lengths[..3].iter().any(|l| (l - scale * scale).abs() > 1e-4 * scale * scale) {
         curves.notes.push("the prim is scaled unevenly: widths are scaled by the mean".into());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FILES: [(&str, &[u8]); 2] = [
+        ("0.8.0", include_bytes!("../../../testdata/openusd-26.11-crate-0.8.0.usdc")),
+        ("0.0.1", include_bytes!("../../../testdata/openusd-24.11-crate-0.0.1.usdc")),
+    ];
+
+    fn close(a: [f32; 3], b: [f32; 3]) -> bool {
+        (0..3).all(|k| (a[k] - b[k]).abs() < 1e-4)
+    }
+
+    /// Curves by OpenUSD: packed numbers, indexed values and transforms come out as they were put in.
+    #[test]
+    fn reads_what_openusd_wrote() {
+        let dir = tempfile::tempdir().unwrap();
+        for (version, bytes) in FILES {
+            let path = dir.path().join(version);
+            std::fs::write(&path, bytes).unwrap();
+            for (frame, y) in [(None, 1.0), (Some(2.0), 2.0), (Some(2.5), 2.5), (Some(99.0), 3.0)] {
+                let curves = read_curves(&path, frame).unwrap();
+                let [hair, lines] = curves.as_slice() else { panic!("{version}: {} prims", curves.len()) };
+                assert_eq!((hair.path.as_str(), hair.name.as_str()), ("/World/hair", "hair"));
+                assert_eq!((hair.stage.meters_per_unit, hair.stage.up, hair.stage.fps), (1.0, 'Z', 25.0));
+                assert_eq!((hair.stage.range, &hair.times), (Some([1.0, 3.0]), &vec![1.0, 2.0, 3.0]));
+                assert_eq!(hair.origin, [1.0, 2.0, 3.0]);
+                assert_eq!(hair.offsets, Offsets::uniform(20, 4));
+                for (i, &p) in hair.points.iter().enumerate() {
+                    // Scaled by two, then a quarter turn about X.
+                    let i = i as f32;
+                    assert!(close(p, [0.5 * i, i, 2.0 * y]), "{version} {frame:?} point {i}: {p:?}");
+                }
+                assert!(hair.width.iter().enumerate().all(|(i, w)| *w == 2.0 * (0.25 * (1 + i % 3) as f32 + 0.125)));
+                assert!(hair.id.iter().copied().eq((0..20).map(|i| ((i * i) << 40) + i)));
+                assert!(hair.root_uv.iter().enumerate().all(|(i, uv)| *uv == [i as f32 / 32.0, 0.5]));
+                let colors = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+                assert!(hair.color.iter().enumerate().all(|(i, c)| *c == colors[i % 2]));
+                assert_eq!((&hair.opacity, hair.notes.len()), (&vec![0.5; 20], 0));
+
+                assert_eq!((lines.kind.as_str(), lines.offsets.len()), ("linear", 16));
+                assert!(lines.offsets.counts().eq((0..16).map(|i| 2 + i % 5)));
+                assert!(lines.points.iter().enumerate().all(|(i, &p)| close(p, [2.0 * i as f32, 0.0, 0.0])));
+                assert!(lines.width.iter().enumerate().all(|(i, w)| *w == 2.0 * i as f32));
+                assert!(lines.stage.notes.iter().any(|n| n.contains("/_class")));
+            }
+        }
+    }
+
+    #[test]
+    fn what_openusd_wrote_may_be_damaged() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a");
+        for (_, bytes) in FILES {
+            for i in (0..bytes.len()).step_by(7) {
+                let mut bad = bytes.to_vec();
+                bad[i] ^= [0xff, 0x01, 0x80][i % 3];
+                std::fs::write(&path, &bad).unwrap();
+                if let Ok(curves) = read_curves(&path, Some(2.0)) {
+                    assert!(curves.iter().all(|c| c.points.len() == c.offsets.total()));
+                }
+                std::fs::write(&path, &bytes[..i]).unwrap();
+                assert!(read_curves(&path, Some(2.0)).is_err());
+            }
+        }
     }
 }

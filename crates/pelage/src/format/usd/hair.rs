@@ -265,7 +265,9 @@ pub fn verify(path: &Path, facts: &ShotFacts, layers: &[HairLayer]) -> Result<()
 fn verify_samples(file: &mut CrateFile, prim: FileNode, facts: &ShotFacts, layer: &HairLayer) -> Result<()> {
     let times: Vec<f64> = facts.frames.iter().map(|&f| f64::from(f)).collect();
     let points = layer.offsets.total() as u64;
-    for (name, kind, len) in [("points", Type::Vec3f, points), ("velocities", Type::Vec3f, points), ("extent", Type::Vec3f, 2)] {
+    for (name, kind, len) in
+        [("points", Type::Vec3f, points), ("velocities", Type::Vec3f, points), ("extent", Type::Vec3f, 2)]
+    {
         let samples = file.attribute(prim, name).and_then(|a| file.field(a, "timeSamples"));
         let samples = samples.ok_or_else(|| file.bad(format!("has no samples of {name}")))?;
         let (found, values) = file.samples(samples)?;
@@ -471,7 +473,9 @@ mod tests {
     fn other_files_are_refused_with_advice() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.usd");
-        for (content, word) in [(&b"#usda 1.0\n"[..], ".usda"), (b"PK\x03\x04", ".usdz"), (b"ply\n", "PXR-USDC"), (b"", "PXR-USDC")] {
+        for (content, word) in
+            [(&b"#usda 1.0\n"[..], ".usda"), (b"PK\x03\x04", ".usdz"), (b"ply\n", "PXR-USDC"), (b"", "PXR-USDC")]
+        {
             std::fs::write(&path, content).unwrap();
             let error = read_curves(&path, None).unwrap_err();
             assert!(error.what.contains(word) && !error.hint.is_empty(), "{error}");

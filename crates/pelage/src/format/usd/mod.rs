@@ -13,6 +13,7 @@ mod coding;
 mod curves;
 mod hair;
 mod read;
+mod tables;
 mod write;
 mod xform;
 
@@ -66,9 +67,40 @@ impl Type {
     fn from_code(code: u8) -> Option<Type> {
         use Type::*;
         let all = [
-            Bool, UChar, Int, UInt, Int64, UInt64, Half, Float, Double, String, Token, Matrix4d, Quatd, Quatf, Quath,
-            Vec2d, Vec2f, Vec2h, Vec2i, Vec3d, Vec3f, Vec3h, Vec3i, Vec4d, Vec4f, Vec4h, Vec4i, Dictionary,
-            TokenVector, Specifier, Variability, TimeSamples, DoubleVector, ValueBlock,
+            Bool,
+            UChar,
+            Int,
+            UInt,
+            Int64,
+            UInt64,
+            Half,
+            Float,
+            Double,
+            String,
+            Token,
+            Matrix4d,
+            Quatd,
+            Quatf,
+            Quath,
+            Vec2d,
+            Vec2f,
+            Vec2h,
+            Vec2i,
+            Vec3d,
+            Vec3f,
+            Vec3h,
+            Vec3i,
+            Vec4d,
+            Vec4f,
+            Vec4h,
+            Vec4i,
+            Dictionary,
+            TokenVector,
+            Specifier,
+            Variability,
+            TimeSamples,
+            DoubleVector,
+            ValueBlock,
         ];
         all.into_iter().find(|t| *t as u8 == code)
     }

@@ -1,49 +1,29 @@
 //! A reader of crate files, versions 0.0.1 to 0.13. It never trusts a size or an offset: every one is compared with
 //! the length of the file before memory is asked for, so that a broken file is an error and nothing else.
 
-use super::coding::{decode_ints, decompress};
+use super::coding::decode_ints;
+pub(super) use super::tables::Node;
+use super::tables::{NEWEST, TABLES, Tables};
 use super::{BOOTSTRAP, END_OF_SET, MAGIC, Number, Rep, Type, spec};
 use crate::format::FormatError;
 use crate::format::bytes::{Broken, Bytes};
 use crate::format::check::read_error;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 type Result<T> = std::result::Result<T, FormatError>;
 
-/// Newest minor version that is read; later ones may have new types of values, which are refused one by one.
-const NEWEST: u8 = 13;
 /// Shorter arrays are never packed.
 const SHORTEST_PACKED: u64 = 16;
-
-/// A prim or property by its number in the table of paths.
-pub(super) type Node = u32;
-
-#[derive(Clone, Copy)]
-struct PathNode {
-    parent: Option<Node>,
-    name: u32,
-}
 
 /// An open file: its tables in memory, its values read on demand.
 pub(super) struct CrateFile {
     path: PathBuf,
     file: File,
     len: u64,
-    version: [u8; 3],
-    tokens: Vec<String>,
-    strings: Vec<u32>,
-    fields: Vec<(u32, Rep)>,
-    sets: Vec<u32>,
-    nodes: Vec<Option<PathNode>>,
-    root: Node,
-    /// First field of each node's set, and the kind of the node, for nodes that have a spec.
-    specs: Vec<Option<(u32, u32)>>,
-    /// (parent, is a property, name) to node.
-    children: BTreeMap<(Node, bool, u32), Node>,
-    token_numbers: BTreeMap<String, u32>,
+    tables: Tables,
 }
 
 impl CrateFile {
@@ -51,21 +31,7 @@ impl CrateFile {
     pub(super) fn open(path: &Path) -> Result<Self> {
         let file = File::open(path).map_err(|e| read_error(path, &e))?;
         let len = file.metadata().map_err(|e| read_error(path, &e))?.len();
-        let mut crate_file = CrateFile {
-            path: path.to_path_buf(),
-            file,
-            len,
-            version: [0; 3],
-            tokens: vec![],
-            strings: vec![],
-            fields: vec![],
-            sets: vec![],
-            nodes: vec![],
-            root: 0,
-            specs: vec![],
-            children: BTreeMap::new(),
-            token_numbers: BTreeMap::new(),
-        };
+        let mut crate_file = CrateFile { path: path.to_path_buf(), file, len, tables: Tables::default() };
         let sections = crate_file.read_head()?;
         crate_file.read_tables(&sections)?;
         Ok(crate_file)
@@ -109,10 +75,6 @@ impl CrateFile {
         Ok(u64::from_le_bytes(out))
     }
 
-    fn at_least(&self, minor: u8) -> bool {
-        self.version[0] > 0 || self.version[1] >= minor
-    }
-
     /// Checks mark and version; returns (name, start, length) of the sections.
     fn read_head(&mut self) -> Result<Vec<(String, u64, u64)>> {
         let head = self.block(0, self.len.min(BOOTSTRAP))?;
@@ -127,8 +89,8 @@ impl CrateFile {
                 .bad("is not a binary USD file (it does not start with \"PXR-USDC\")")
                 .hint("if it is an export that was interrupted, export it again"));
         }
-        self.version = [head[8], head[9], head[10]];
-        let [major, minor, patch] = self.version;
+        self.tables.version = [head[8], head[9], head[10]];
+        let [major, minor, patch] = self.tables.version;
         if major > 0 || minor > NEWEST {
             return Err(self
                 .bad(format!("has crate version {major}.{minor}.{patch}, versions up to 0.{NEWEST} are read"))
@@ -147,208 +109,31 @@ impl CrateFile {
     }
 
     fn read_tables(&mut self, sections: &[(String, u64, u64)]) -> Result<()> {
-        type Parse = fn(&mut CrateFile, Bytes, u64) -> std::result::Result<(), Broken>;
-        let tables: [(&str, Parse); 6] = [
-            ("TOKENS", Self::read_tokens),
-            ("STRINGS", Self::read_strings),
-            ("FIELDS", Self::read_fields),
-            ("FIELDSETS", Self::read_sets),
-            ("PATHS", Self::read_paths),
-            ("SPECS", Self::read_specs),
-        ];
-        for (name, parse) in tables {
+        for (name, parse) in TABLES {
             let Some((_, start, len)) = sections.iter().find(|s| s.0 == name) else {
                 return Err(self.bad(format!("has no section {name}")));
             };
             let bytes = self.block(*start, *len)?;
-            parse(self, Bytes::new(&bytes), *start).map_err(|e| self.bad_at(*start, format!("section {name}: {e}")))?;
-        }
-        Ok(())
-    }
-
-    fn read_tokens(&mut self, mut input: Bytes, _: u64) -> std::result::Result<(), Broken> {
-        let count = input.u64()?;
-        let size = input.u64()?;
-        let text = if self.at_least(4) {
-            let packed = input.u64()?;
-            decompress(input.take(packed)?, size)?
-        } else {
-            input.take(size)?.to_vec()
-        };
-        for token in text.split_inclusive(|&b| b == 0) {
-            let token = token.strip_suffix(&[0]).ok_or("the last token has no end")?;
-            let token = str::from_utf8(token).map_err(|_| "a token is not UTF-8")?;
-            self.token_numbers.entry(token.to_owned()).or_insert(self.tokens.len() as u32);
-            self.tokens.push(token.to_owned());
-        }
-        match self.tokens.len() as u64 == count {
-            true => Ok(()),
-            false => Err(format!("{count} tokens are announced, {} are there", self.tokens.len())),
-        }
-    }
-
-    fn read_strings(&mut self, mut input: Bytes, _: u64) -> std::result::Result<(), Broken> {
-        let count = input.u64()?;
-        let bytes = input.take(count.saturating_mul(4))?;
-        self.strings = bytes.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b)).collect();
-        Ok(())
-    }
-
-    fn read_fields(&mut self, mut input: Bytes, _: u64) -> std::result::Result<(), Broken> {
-        let count = input.u64()?;
-        if !self.at_least(4) {
-            let mut rows = Bytes::new(input.take(count.saturating_mul(16))?);
-            for _ in 0..count {
-                rows.u32()?;
-                self.fields.push((rows.u32()?, Rep(rows.u64()?)));
-            }
-            return Ok(());
-        }
-        let names = read_ints(&mut input, count)?;
-        let packed = input.u64()?;
-        let reps = decompress(input.take(packed)?, count.saturating_mul(8))?;
-        let reps = reps.as_chunks::<8>().0;
-        if reps.len() != names.len() {
-            return Err(format!("{count} values are announced, {} are there", reps.len()));
-        }
-        self.fields = names.iter().zip(reps).map(|(&n, r)| (n as u32, Rep(u64::from_le_bytes(*r)))).collect();
-        Ok(())
-    }
-
-    fn read_sets(&mut self, mut input: Bytes, _: u64) -> std::result::Result<(), Broken> {
-        let count = input.u64()?;
-        self.sets = if self.at_least(4) {
-            read_ints(&mut input, count)?.iter().map(|&i| i as u32).collect()
-        } else {
-            let bytes = input.take(count.saturating_mul(4))?;
-            bytes.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b)).collect()
-        };
-        Ok(())
-    }
-
-    fn read_paths(&mut self, mut input: Bytes, start: u64) -> std::result::Result<(), Broken> {
-        let whole = input;
-        let count = input.u64()?;
-        // (path, name, is a property, jump) of the entries in file order
-        let mut stack: Vec<(u64, Option<Node>)> = vec![];
-        if self.at_least(4) {
-            let encoded = input.u64()?;
-            let paths = read_ints(&mut input, encoded)?;
-            let names = read_ints(&mut input, encoded)?;
-            let jumps = read_ints(&mut input, encoded)?;
-            if count > encoded * 2 + 16 {
-                return Err(format!("{count} paths are announced, {encoded} are there"));
-            }
-            self.nodes = vec![None; count as usize];
-            stack.push((0, None));
-            while let Some((mut i, mut parent)) = stack.pop() {
-                loop {
-                    let k = usize::try_from(i).ok().filter(|&k| k < paths.len()).ok_or("a path is out of range")?;
-                    let node = paths[k] as u32;
-                    self.add_path(node, parent, names[k].unsigned_abs() as u32, names[k] < 0)?;
-                    let (child, sibling) = (jumps[k] > 0 || jumps[k] == -1, jumps[k] >= 0);
-                    if child && sibling {
-                        stack.push((i + jumps[k] as u64, parent));
-                    }
-                    if child {
-                        parent = Some(node);
-                    }
-                    if !(child || sibling) {
-                        break;
-                    }
-                    i += 1;
-                }
-            }
-            return Ok(());
-        }
-        // Old layout: records one after the other; one with child and sibling is followed by the sibling's offset.
-        let record = if self.version == [0, 0, 1] { 16 } else { 12 };
-        if count > whole.rest().len() as u64 {
-            return Err(format!("{count} paths are announced"));
-        }
-        self.nodes = vec![None; count as usize];
-        stack.push((8, None));
-        while let Some((at, mut parent)) = stack.pop() {
-            let mut input = whole;
-            input.take(at)?;
-            loop {
-                let mut row = Bytes::new(input.take(record)?);
-                if record == 16 {
-                    row.u32()?;
-                }
-                let (node, name, bits) = (row.u32()?, row.u32()?, row.u8()?);
-                self.add_path(node, parent, name, bits & 4 != 0)?;
-                let (child, sibling) = (bits & 1 != 0, bits & 2 != 0);
-                if child && sibling {
-                    let at = input.u64()?.checked_sub(start).ok_or("a path is out of range")?;
-                    stack.push((at, parent));
-                }
-                if child {
-                    parent = Some(node);
-                }
-                if !(child || sibling) {
-                    break;
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Takes a path into the tree. Every node can come once, so a broken tree ends.
-    fn add_path(&mut self, node: Node, parent: Option<Node>, name: u32, property: bool) -> std::result::Result<(), Broken> {
-        let slot = self.nodes.get_mut(node as usize).ok_or("a path has a number out of range")?;
-        if slot.is_some() {
-            return Err(format!("path {node} comes twice"));
-        }
-        *slot = Some(PathNode { parent, name });
-        match parent {
-            None => self.root = node,
-            Some(p) => drop(self.children.insert((p, property, name), node)),
-        }
-        Ok(())
-    }
-
-    fn read_specs(&mut self, mut input: Bytes, _: u64) -> std::result::Result<(), Broken> {
-        let count = input.u64()?;
-        let (mut paths, mut sets, mut kinds) = (vec![], vec![], vec![]);
-        if self.at_least(4) {
-            paths = read_ints(&mut input, count)?;
-            sets = read_ints(&mut input, count)?;
-            kinds = read_ints(&mut input, count)?;
-        } else {
-            let padded = self.version == [0, 0, 1];
-            let mut rows = Bytes::new(input.take(count.saturating_mul(if padded { 16 } else { 12 }))?);
-            for _ in 0..count {
-                if padded {
-                    rows.u32()?;
-                }
-                for column in [&mut paths, &mut sets, &mut kinds] {
-                    column.push(i64::from(rows.u32()?));
-                }
-            }
-        }
-        self.specs = vec![None; self.nodes.len()];
-        for ((path, set), kind) in paths.into_iter().zip(sets).zip(kinds) {
-            let slot = usize::try_from(path).ok().and_then(|p| self.specs.get_mut(p));
-            *slot.ok_or("a spec has a path out of range")? = Some((set as u32, kind as u32));
+            parse(&mut self.tables, Bytes::new(&bytes), *start)
+                .map_err(|e| self.bad_at(*start, format!("section {name}: {e}")))?;
         }
         Ok(())
     }
 
     /// The root of the tree.
     pub(super) fn root(&self) -> Node {
-        self.root
+        self.tables.root
     }
 
     /// Name of a prim or property.
     pub(super) fn name(&self, node: Node) -> &str {
-        let name = self.nodes.get(node as usize).copied().flatten().map_or(u32::MAX, |n| n.name);
-        self.tokens.get(name as usize).map_or("?", |s| s)
+        let name = self.tables.nodes.get(node as usize).copied().flatten().map_or(u32::MAX, |n| n.name);
+        self.tables.tokens.get(name as usize).map_or("?", |s| s)
     }
 
     /// The parent of a prim or property, `None` for the root.
     pub(super) fn parent(&self, node: Node) -> Option<Node> {
-        self.nodes.get(node as usize).copied().flatten()?.parent
+        self.tables.nodes.get(node as usize).copied().flatten()?.parent
     }
 
     /// The prims below `node`, in the order of the file.
@@ -357,23 +142,23 @@ impl CrateFile {
         let mut seen = BTreeSet::new();
         let mut names = self.token_numbers_of(rep)?;
         names.retain(|&n| seen.insert(n)); // a broken file may name one twice
-        Ok(names.iter().filter_map(|&n| self.children.get(&(node, false, n)).copied()).collect())
+        Ok(names.iter().filter_map(|&n| self.tables.children.get(&(node, false, n)).copied()).collect())
     }
 
     /// The attribute `name` of a prim.
     pub(super) fn attribute(&self, prim: Node, name: &str) -> Option<Node> {
-        let name = self.token_numbers.get(name)?;
-        let node = *self.children.get(&(prim, true, *name))?;
-        let (_, kind) = (*self.specs.get(node as usize)?)?;
+        let name = self.tables.token_numbers.get(name)?;
+        let node = *self.tables.children.get(&(prim, true, *name))?;
+        let (_, kind) = (*self.tables.specs.get(node as usize)?)?;
         (kind == spec::ATTRIBUTE).then_some(node)
     }
 
     /// The field `name` of a prim or property.
     pub(super) fn field(&self, node: Node, name: &str) -> Option<Rep> {
-        let name = *self.token_numbers.get(name)?;
-        let (set, _) = (*self.specs.get(node as usize)?)?;
-        let set = self.sets.get(set as usize..)?;
-        let fields = set.iter().take_while(|&&f| f != END_OF_SET).filter_map(|&f| self.fields.get(f as usize));
+        let name = *self.tables.token_numbers.get(name)?;
+        let (set, _) = (*self.tables.specs.get(node as usize)?)?;
+        let set = self.tables.sets.get(set as usize..)?;
+        let fields = set.iter().take_while(|&&f| f != END_OF_SET).filter_map(|&f| self.tables.fields.get(f as usize));
         fields.into_iter().find(|f| f.0 == name).map(|f| f.1)
     }
 
@@ -384,7 +169,7 @@ impl CrateFile {
     }
 
     fn token_text(&self, number: u64) -> Result<String> {
-        let token = usize::try_from(number).ok().and_then(|n| self.tokens.get(n));
+        let token = usize::try_from(number).ok().and_then(|n| self.tables.tokens.get(n));
         token.cloned().ok_or_else(|| self.bad(format!("refers to token {number}, which does not exist")))
     }
 
@@ -393,7 +178,7 @@ impl CrateFile {
         match self.kind(rep)? {
             Type::Token if rep.is(Rep::INLINE) => self.token_text(rep.payload()),
             Type::String if rep.is(Rep::INLINE) => {
-                let number = usize::try_from(rep.payload()).ok().and_then(|n| self.strings.get(n));
+                let number = usize::try_from(rep.payload()).ok().and_then(|n| self.tables.strings.get(n));
                 self.token_text(number.map_or(u64::MAX, |&n| u64::from(n)))
             }
             other => Err(self.bad(format!("a value has type {other:?}, expected text"))),
@@ -421,10 +206,10 @@ impl CrateFile {
         if at == 0 {
             return Ok((0, 0));
         }
-        if !self.at_least(5) {
+        if !self.tables.at_least(5) {
             at += 4; // a rank that is always 1
         }
-        if self.at_least(7) {
+        if self.tables.at_least(7) {
             return Ok((at + 8, self.u64_at(at)?));
         }
         let mut count = [0; 4];
@@ -463,7 +248,7 @@ impl CrateFile {
             return Ok(self.numbers(rep)?.into_iter().map(|v| v as i64).collect());
         }
         let (at, count) = self.span(rep)?;
-        if rep.is(Rep::COMPRESSED) && self.at_least(5) && count >= SHORTEST_PACKED {
+        if rep.is(Rep::COMPRESSED) && self.tables.at_least(5) && count >= SHORTEST_PACKED {
             return Ok(self.packed_ints(at, count, wide)?.0);
         }
         let bytes = self.block(at, count.saturating_mul(number.size() as u64))?;
@@ -551,7 +336,9 @@ impl CrateFile {
         let count = self.u64_at(at)?;
         let values = self.block(at + 8, count.saturating_mul(8))?;
         let values: Vec<Rep> = values.as_chunks().0.iter().map(|b| Rep(u64::from_le_bytes(*b))).collect();
-        if values.len() != times.len() || times.windows(2).any(|w| !matches!(w[0].partial_cmp(&w[1]), Some(std::cmp::Ordering::Less))) {
+        if values.len() != times.len()
+            || times.windows(2).any(|w| !matches!(w[0].partial_cmp(&w[1]), Some(std::cmp::Ordering::Less)))
+        {
             return Err(self.bad_at(at, format!("{} times for {} values, or not ascending", times.len(), values.len())));
         }
         Ok((times, values))
@@ -562,11 +349,6 @@ impl CrateFile {
         let by = self.u64_at(at)? as i64;
         at.checked_add_signed(by).ok_or_else(|| self.bad_at(at, "a jump leads out of the file"))
     }
-}
-
-fn read_ints(input: &mut Bytes, count: u64) -> std::result::Result<Vec<i64>, Broken> {
-    let size = input.u64()?;
-    decode_ints(input.take(size)?, count, false)
 }
 
 fn decode_numbers(bytes: &[u8], number: Number) -> Vec<f64> {
@@ -617,7 +399,13 @@ mod tests {
 
     #[test]
     fn half_floats() {
-        let known = [(0x3c00, 1.0), (0xc000, -2.0), (0x7bff, 65504.0), (0x0001, 5.960_464_477_539_063e-8), (0x3555, 0.333_251_953_125)];
+        let known = [
+            (0x3c00, 1.0),
+            (0xc000, -2.0),
+            (0x7bff, 65504.0),
+            (0x0001, 5.960_464_477_539_063e-8),
+            (0x3555, 0.333_251_953_125),
+        ];
         for (bits, value) in known {
             assert_eq!(half(bits), value);
         }

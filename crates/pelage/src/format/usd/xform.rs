@@ -10,7 +10,8 @@ type Result<T> = std::result::Result<T, FormatError>;
 pub(super) type Matrix = [[f64; 4]; 4];
 
 /// No transform.
-pub(super) const IDENTITY: Matrix = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+pub(super) const IDENTITY: Matrix =
+    [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
 
 /// First `a`, then `b`.
 pub(super) fn then(a: &Matrix, b: &Matrix) -> Matrix {
@@ -24,7 +25,12 @@ pub(super) fn determinant(m: &Matrix) -> f64 {
 }
 
 /// The transform from the space of `prim` to the space of the scene at `frame`. What cannot be followed is noted.
-pub(super) fn local_to_world(file: &mut CrateFile, prim: Node, frame: Option<f64>, notes: &mut Vec<String>) -> Result<Matrix> {
+pub(super) fn local_to_world(
+    file: &mut CrateFile,
+    prim: Node,
+    frame: Option<f64>,
+    notes: &mut Vec<String>,
+) -> Result<Matrix> {
     let mut world = IDENTITY;
     let mut next = Some(prim);
     while let Some(node) = next {
@@ -99,7 +105,12 @@ fn rotation(axis: u8, degrees: f64) -> Matrix {
 /// The rotation of a quaternion with imaginary part `v` and real part `r`, of any length but zero.
 fn from_quaternion(v: [f64; 3], r: f64) -> Option<Matrix> {
     let n = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] + r * r).sqrt();
-    let ([x, y, z], r) = (v.map(|c| c / n), r / n);
+    // USD takes the angle from the real part alone. Where rounding is all that keeps it from a unit, so is it here,
+    // to agree with USD; between two samples it is far from one.
+    let r = if (n - 1.0).abs() < 1e-5 { r.clamp(-1.0, 1.0) } else { r / n };
+    let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+    let scale = if length > 0.0 { (1.0 - r * r).max(0.0).sqrt() / length } else { 0.0 };
+    let [x, y, z] = v.map(|c| c * scale);
     let rows = [
         [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * r), 2.0 * (x * z - y * r), 0.0],
         [2.0 * (x * y - z * r), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + x * r), 0.0],
@@ -114,16 +125,14 @@ fn invert(m: &Matrix) -> Option<Matrix> {
     if det == 0.0 || !det.is_finite() {
         return None;
     }
-    let mut out = IDENTITY;
-    for i in 0..3 {
-        for j in 0..3 {
-            let (a, b, c, d) = ((j + 1) % 3, (j + 2) % 3, (i + 1) % 3, (i + 2) % 3);
-            out[i][j] = (m[a][c] * m[b][d] - m[a][d] * m[b][c]) / det;
-        }
-    }
-    for j in 0..3 {
-        out[3][j] = -(0..3).map(|k| m[3][k] * out[k][j]).sum::<f64>();
-    }
+    let cofactor = |i: usize, j: usize| {
+        let (a, b, c, d) = ((j + 1) % 3, (j + 2) % 3, (i + 1) % 3, (i + 2) % 3);
+        (m[a][c] * m[b][d] - m[a][d] * m[b][c]) / det
+    };
+    let rows: [[f64; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| cofactor(i, j)));
+    let back = |j: usize| -(0..3).map(|k| m[3][k] * rows[k][j]).sum::<f64>();
+    let [x, y, z] = rows.map(|[a, b, c]| [a, b, c, 0.0]);
+    let out = [x, y, z, [back(0), back(1), back(2), 1.0]];
     Some(out)
 }
 

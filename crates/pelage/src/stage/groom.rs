@@ -1,0 +1,265 @@
+//! Groom: control hairs placed on the rest skin and combed.
+
+use super::run::{Counts, Runner};
+use super::tables::{self, decode, encode, root_columns, roots_of, table, vector_columns, vectors_of};
+use super::{Skin, What};
+use crate::Error;
+use crate::config::{Comb, CombKind as Kind, MapRef, Side, Space};
+use crate::curves;
+use crate::format::ply;
+use pelage_geom::{Offsets, SurfacePoint, TiledMap, Vec3};
+use pelage_groom::candidates::candidates;
+use pelage_groom::comb::{CombKind, CombOp, DirectionSpace, comb};
+use pelage_groom::control::{self, ControlHairs, PartingPiece, Sites};
+use pelage_groom::place::{PlaceSettings, Placement, place};
+use pelage_groom::push_up::{PushUp, push_up};
+use std::rc::Rc;
+
+/// Seed of the blue-noise roots of control hairs; no layer's seed has the upper half set.
+const CONTROL_SEED: u64 = 1 << 32;
+
+/// The rest skin, read once a run.
+pub fn skin(run: &mut Runner<'_>) -> Result<Rc<Skin>, Error> {
+    if let Some(found) = &run.skin {
+        return Ok(found.clone());
+    }
+    let read = Rc::new(Skin::read(run.project)?);
+    run.warnings.extend(read.warnings.iter().cloned());
+    run.skin = Some(read.clone());
+    Ok(read)
+}
+
+/// Where control hairs stand in texture space.
+pub fn placed(run: &mut Runner<'_>) -> Result<Sites, Error> {
+    let found = run.fetch(What::Place).and_then(|e| decode_sites(e.payload.first()?));
+    if let Some(sites) = found {
+        return Ok(sites);
+    }
+    let (hairs, sites, counts) = place_hairs(run)?;
+    let file = encode("sites of control hairs: chart, u, v, left and right hair; borders; partings", &[
+        table("site", [
+            vec![("chart", ply::Column::U32(sites.chart.clone()))],
+            vector_columns(["u", "v"], &sites.uv),
+            pair_columns(["left", "right"], &sites.hair),
+        ].concat()),
+        table("border", pair_columns(["a", "b"], &sites.border_edges)),
+        table("piece", vec![
+            ("parting", ply::Column::U32(sites.partings.iter().map(|p| p.parting).collect())),
+            ("chart", ply::Column::U32(sites.partings.iter().map(|p| p.chart).collect())),
+            ("count", ply::Column::U32(sites.partings.iter().map(|p| p.site.len() as u32).collect())),
+        ]),
+        table("piece_site", vec![("site", ply::Column::U32(sites.partings.iter().flat_map(|p| p.site.clone()).collect()))]),
+    ]);
+    run.keep(What::Place, counts, &[("data.ply", &file)])?;
+    run.placed = Some(hairs);
+    Ok(sites)
+}
+
+fn pair_columns(names: [&'static str; 2], pairs: &[[u32; 2]]) -> Vec<(&'static str, ply::Column)> {
+    (0..2).map(|x| (names[x], ply::Column::U32(pairs.iter().map(|p| p[x]).collect()))).collect()
+}
+
+fn pairs_of(t: &ply::Table, names: [&str; 2]) -> Option<Vec<[u32; 2]>> {
+    let (a, b) = (t.u32(names[0])?, t.u32(names[1])?);
+    Some(a.iter().zip(b).map(|(a, b)| [*a, *b]).collect())
+}
+
+fn decode_sites(bytes: &[u8]) -> Option<Sites> {
+    let file = decode(bytes)?;
+    let (site, border) = (file.get("site")?, file.get("border")?);
+    let (piece, member) = (file.get("piece")?, file.get("piece_site")?.u32("site")?);
+    let offsets = Offsets::from_counts(piece.u32("count")?.iter().map(|n| *n as usize));
+    let (parting, chart) = (piece.u32("parting")?, piece.u32("chart")?);
+    let part = |i: usize| {
+        Some(PartingPiece { parting: parting[i], chart: chart[i], site: member.get(offsets.range(i))?.to_vec() })
+    };
+    Some(Sites {
+        chart: site.u32("chart")?.to_vec(),
+        uv: vectors_of(site, ["u", "v"])?,
+        hair: pairs_of(site, ["left", "right"])?,
+        border_edges: pairs_of(border, ["a", "b"])?,
+        partings: (0..offsets.len()).map(part).collect::<Option<_>>()?,
+    })
+}
+
+/// Places control hairs at their length before combing.
+fn place_hairs(run: &mut Runner<'_>) -> Result<(ControlHairs, Sites, Counts), Error> {
+    let skin = skin(run)?;
+    let groom = &run.project.groom.value;
+    let (_, length) = run.project.control_length();
+    let length_map = length.map.clone().map(|map| MapRef { map, channel: length.channel, wrap: length.wrap });
+    let length_map = length_map.map(|m| run.map(&m)).transpose()?;
+    let partings: Vec<Vec<Vec3>> = partings(run);
+    let p = &groom.control.placement;
+    let per_unit2 = p.per_cm2.unwrap_or(0.0) * run.project.cm2_per_unit2();
+    let root: Vec<SurfacePoint> = match p.per_cm2 {
+        Some(_) => {
+            let count = (per_unit2 * skin.area()).round() as usize;
+            candidates(&skin.mesh, &skin.topology, CONTROL_SEED, count, &mut |_| true).map(|c| c.root).unwrap_or_default()
+        }
+        None => Vec::new(),
+    };
+    let drawn = run.project.drawn.as_ref().map(|f| Ok::<_, Error>(curves::read(&f.path, None)?.joined())).transpose()?;
+    // Partings and drawn hairs keep the distance that the density asks for, or half a centimetre.
+    let half_cm = 0.5 / run.project.cm2_per_unit2().sqrt();
+    let spacing = if per_unit2 > 0.0 { (0.5 / per_unit2.sqrt()).min(2.0 * half_cm) } else { half_cm };
+    let placement = match (&drawn, p.grid) {
+        (Some(drawn), _) => Placement::Curves { drawn, spacing: 0.1 * half_cm },
+        (None, Some([u, v])) => Placement::Grid { u, v },
+        (None, None) => Placement::PerArea { density: per_unit2, root: &root },
+    };
+    let settings = PlaceSettings {
+        placement,
+        points: groom.control.points,
+        length: length.value,
+        length_map: length_map.as_ref(),
+        partings: &partings,
+        parting_spacing: spacing,
+    };
+    let (hairs, sites, c) = place(&view(&skin), skin.bvh(), &settings);
+    let mut counts = Counts::new();
+    for (name, n) in [
+        ("control hairs", hairs.len()),
+        ("control hairs on chart borders", c.border),
+        ("control hairs on partings", c.partings.hairs),
+        ("control hairs too near to others", c.dropped),
+        ("drawn hairs without length", c.skipped_short),
+    ] {
+        counts.insert(name.to_owned(), n as u64);
+    }
+    if drawn.is_some() {
+        let unit = run.project.shot.value.shot.meters_per_unit * 1e3;
+        let (mean, max) = (c.bind_mean * unit, c.bind_max * unit);
+        run.warnings.push(format!("drawn hairs were moved onto the skin by {mean:.2} mm on average, {max:.2} mm at most"));
+    }
+    Ok((hairs, sites, counts))
+}
+
+fn view(skin: &Skin) -> control::Skin<'_> {
+    control::Skin { mesh: &skin.mesh, topology: &skin.topology, rest: &skin.rest }
+}
+
+fn partings(run: &Runner<'_>) -> Vec<Vec<Vec3>> {
+    let groom = &run.project.groom.value;
+    groom.parting.iter().map(|p| p.points.iter().map(|q| Vec3::from(*q)).collect()).collect()
+}
+
+/// Control hairs after combing.
+pub fn combed(run: &mut Runner<'_>) -> Result<Rc<ControlHairs>, Error> {
+    if let Some(found) = &run.control {
+        return Ok(found.clone());
+    }
+    let hairs = match run.fetch(What::Comb).and_then(|e| decode_hairs(e.payload.first()?)) {
+        Some(found) => found,
+        None => comb_hairs(run)?,
+    };
+    let hairs = Rc::new(hairs);
+    run.control = Some(hairs.clone());
+    Ok(hairs)
+}
+
+fn comb_hairs(run: &mut Runner<'_>) -> Result<ControlHairs, Error> {
+    let mut hairs = match run.placed.take() {
+        Some(hairs) => hairs,
+        None => place_hairs(run)?.0,
+    };
+    let skin = skin(run)?;
+    let project = run.project;
+    let lines = partings(run);
+    let maps = comb_maps(run)?;
+    let ops: Vec<CombOp<'_>> =
+        project.groom.value.comb.iter().zip(&maps).map(|(c, (region, map))| operation(run, c, region, map)).collect();
+    let done = comb(&view(&skin), &lines, &ops, &mut hairs);
+    let mut counts = Counts::from([
+        ("control hairs combed".to_owned(), done.iter().map(|c| c.combed).max().unwrap_or(0) as u64),
+        ("control hairs without a painted direction".to_owned(), done.iter().map(|c| c.unpainted as u64).sum()),
+    ]);
+    let control = &project.groom.value.control;
+    if control.push_up && control.clearance > 0.0 {
+        let millimetre = 1e-3 / project.shot.value.shot.meters_per_unit;
+        let settings = PushUp { step: millimetre, clearance: control.clearance * millimetre };
+        let pushed = push_up(&view(&skin), skin.bvh(), &settings, &mut hairs);
+        for (name, n) in [
+            ("control hairs pushed out of the skin", pushed.pushed),
+            ("control hairs pushed past the normal", pushed.escaped),
+            ("control hairs that could not be cleared", pushed.uncleared),
+        ] {
+            counts.insert(name.to_owned(), n as u64);
+        }
+    }
+    run.keep(What::Comb, counts, &[("data.ply", &encode_hairs(&hairs))])?;
+    Ok(hairs)
+}
+
+/// Region and main map of every operation.
+fn comb_maps(run: &Runner<'_>) -> Result<Vec<(Option<TiledMap>, Option<TiledMap>)>, Error> {
+    let read = |m: &Option<MapRef>, rgb: bool| -> Result<Option<TiledMap>, Error> {
+        m.as_ref().map(|m| super::skin::read_map(&run.project.maps[&m.map], m, rgb)).transpose()
+    };
+    let both = |c: &Comb| Ok((read(&c.region, false)?, read(&c.map, c.kind == Kind::DirectionMap)?));
+    run.project.groom.value.comb.iter().map(both).collect()
+}
+
+fn operation<'a>(run: &Runner<'_>, c: &Comb, region: &'a Option<TiledMap>, map: &'a Option<TiledMap>) -> CombOp<'a> {
+    let curvature = c.curvature;
+    let bend = c.bend.unwrap_or(1.0);
+    let kind = match c.kind {
+        Kind::DirectionCurve => CombKind::DirectionCurve {
+            points: c.points.iter().flatten().map(|p| Vec3::from(*p)).collect(),
+            radius: c.radius.unwrap_or(f64::INFINITY),
+            falloff: c.falloff.unwrap_or(1.0),
+            bend,
+            curvature,
+        },
+        Kind::DirectionMap => CombKind::DirectionMap {
+            map: map.as_ref().expect("checked: the operation has a map"),
+            space: match c.space.unwrap_or_default() {
+                Space::Root => DirectionSpace::Root,
+                Space::World => DirectionSpace::World,
+            },
+            bend,
+            curvature,
+        },
+        Kind::Bend => CombKind::Bend { angle: c.angle.unwrap_or(0.0), map: map.as_ref(), curvature },
+        Kind::LayDown => CombKind::LayDown { amount: c.amount.unwrap_or(0.0), map: map.as_ref() },
+        Kind::Length => CombKind::Length { value: c.value.unwrap_or(1.0), map: map.as_ref() },
+    };
+    let parting = |name: &String| run.project.groom.value.parting.iter().position(|p| p.name == *name);
+    let side = match (c.parting.as_ref().and_then(parting), c.side) {
+        (Some(p), Some(Side::Left)) => Some((p as u32, 1)),
+        (Some(p), Some(Side::Right)) => Some((p as u32, -1)),
+        _ => None,
+    };
+    CombOp { kind, weight: c.weight, region: region.as_ref(), side }
+}
+
+fn encode_hairs(hairs: &ControlHairs) -> Vec<u8> {
+    let mut columns = root_columns(&hairs.root);
+    columns.push(("side", ply::Column::I32(hairs.side.iter().map(|s| i32::from(*s)).collect())));
+    columns.push(("parting", ply::Column::U32(hairs.parting.clone())));
+    columns.push(("border", ply::Column::U8(hairs.border.iter().map(|b| u8::from(*b)).collect())));
+    let comment = format!("control hairs, {} points each: n, du, dv along [N, dU, N x dU] from the root", hairs.points);
+    encode(&comment, &[
+        table("hair", columns),
+        table("point", vector_columns(["n", "du", "dv"], &hairs.local)),
+        table("shape", vec![("points", ply::Column::U32(vec![hairs.points as u32]))]),
+    ])
+}
+
+fn decode_hairs(bytes: &[u8]) -> Option<ControlHairs> {
+    let file: tables::Tables = decode(bytes)?;
+    let (hair, point) = (file.get("hair")?, file.get("point")?);
+    let points = *file.get("shape")?.u32("points")?.first()? as usize;
+    let ply::Column::I32(side) = hair.column("side")? else { return None };
+    let ply::Column::U8(border) = hair.column("border")? else { return None };
+    let local = vectors_of(point, ["n", "du", "dv"])?;
+    (local.len() == hair.rows * points).then_some(())?;
+    Some(ControlHairs {
+        points,
+        root: roots_of(hair)?,
+        local,
+        side: side.iter().map(|s| *s as i8).collect(),
+        parting: hair.u32("parting")?.to_vec(),
+        border: border.iter().map(|b| *b != 0).collect(),
+    })
+}

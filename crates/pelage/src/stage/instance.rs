@@ -1,0 +1,183 @@
+//! Instance: roots, ids, weights and features of every hair, on the rest pose, once per groom. One cache entry a column.
+
+use super::run::{Counts, Runner};
+use super::tables::{decode, encode, id_columns, ids_of, root_columns, roots_of, table, vector_columns, vectors_of};
+use super::{Skin, What, candidate_density, groom, layer_seed};
+use crate::Error;
+use crate::config::{Feature, MapRef};
+use crate::format::ply::Column;
+use pelage_geom::{TiledMap, rng};
+use pelage_groom::candidates::{Candidates, candidates as find_candidates};
+use pelage_groom::instance::{Density, Feature as FeatureSource, Roots, colour_column, feature_column};
+use pelage_groom::instance::{roots as find_roots, weights as find_weights};
+use pelage_groom::triangulate::{mirrored_charts, triangulate};
+
+/// Blue-noise candidate roots of a layer.
+pub fn candidates(run: &mut Runner<'_>, i: usize) -> Result<Candidates, Error> {
+    let what = What::Candidates(i);
+    let skin = groom::skin(run)?;
+    if let Some(entry) = run.fetch(what)
+        && let Some(root) = entry.payload.first().and_then(|b| roots_of(decode(b)?.get("candidate")?))
+    {
+        return Ok(Candidates { root, area: skin.area() });
+    }
+    let layer = &run.project.groom.value.layer[i];
+    let density = candidate_density(layer.density.value) * run.project.cm2_per_unit2();
+    let count = (density * skin.area()).ceil() as usize;
+    if u32::try_from(count).is_err() {
+        let what = format!("layer {} asks for {count} candidate roots, more than 2^32", layer.name);
+        return Err(Error::input(what, "lower density.value, or check shot.meters_per_unit"));
+    }
+    let found = search(&skin, layer_seed(&layer.name), count);
+    let file = encode("candidate roots in blue-noise order: a prefix is as even as the whole", &[
+        table("candidate", root_columns(&found.root)),
+    ]);
+    run.keep(what, Counts::from([("candidates".to_owned(), found.root.len() as u64)]), &[("data.ply", &file)])?;
+    Ok(found)
+}
+
+fn search(skin: &Skin, seed: u32, count: usize) -> Candidates {
+    find_candidates(&skin.mesh, &skin.topology, u64::from(seed), count, &mut |_| true).expect("nothing stops the search")
+}
+
+/// Roots of a layer's hairs: the candidates whose rank is below the local density.
+pub fn roots(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
+    let what = What::Roots(i);
+    if let Some(found) = run.fetch(what).and_then(|e| decode_roots(e.payload.first()?)) {
+        return Ok(found);
+    }
+    let skin = groom::skin(run)?;
+    let mut candidates = candidates(run, i)?;
+    let layer = &run.project.groom.value.layer[i];
+    let map = feature_map(run, &layer.density)?;
+    let on_off = layer.on_off.as_ref().map(|m| run.map(m)).transpose()?;
+    let density = Density {
+        value: layer.density.value * run.project.cm2_per_unit2(),
+        map: map.as_ref(),
+        on_off: on_off.as_ref(),
+    };
+    let seed = layer_seed(&layer.name);
+    let needed = density.needed_candidates(skin.area());
+    if needed > candidates.root.len() {
+        run.warnings.push(format!("layer {}: the density map exceeds 1; candidates beyond the cached ones", layer.name));
+        candidates = search(&skin, seed, needed);
+    }
+    let found = find_roots(&skin.mesh, &skin.topology, &candidates, &density, seed);
+    let counts = Counts::from([
+        ("hairs".to_owned(), found.id.len() as u64),
+        (format!("hairs in layer {}", layer.name), found.id.len() as u64),
+    ]);
+    let columns = [
+        id_columns(&found.id),
+        root_columns(&found.root),
+        vector_columns(["u", "v"], &found.uv),
+        vec![("chart", Column::U32(found.chart.clone()))],
+    ];
+    let file = encode("hairs: id, root on the rest skin, texture coordinates, chart", &[table("hair", columns.concat())]);
+    run.keep(what, counts, &[("data.ply", &file)])?;
+    Ok(found)
+}
+
+fn decode_roots(bytes: &[u8]) -> Option<Roots> {
+    let file = decode(bytes)?;
+    let hair = file.get("hair")?;
+    Some(Roots {
+        root: roots_of(hair)?,
+        uv: vectors_of(hair, ["u", "v"])?,
+        chart: hair.u32("chart")?.to_vec(),
+        id: ids_of(hair)?,
+    })
+}
+
+/// Control hairs of every hair, and their weights.
+pub type Weights = (Vec<[u32; 3]>, Vec<[f32; 3]>);
+
+/// The three control hairs around every hair and their barycentric weights.
+pub fn weights(run: &mut Runner<'_>, i: usize) -> Result<Weights, Error> {
+    let what = What::Weights(i);
+    if let Some(found) = run.fetch(what).and_then(|e| decode_weights(e.payload.first()?)) {
+        return Ok(found);
+    }
+    let skin = groom::skin(run)?;
+    let sites = groom::placed(run)?;
+    let roots = roots(run, i)?;
+    let triangulation = triangulate(&sites, &mirrored_charts(&skin.mesh, &skin.topology));
+    let found = find_weights(&roots, &triangulation);
+    let c = triangulation.counts;
+    let counts = Counts::from(
+        [
+            ("hairs outside the control triangulation", found.outside),
+            ("hairs in charts without control hairs", found.orphans),
+            ("control sites at the place of another", c.duplicates),
+            ("control edges left out because they cross", c.crossing),
+            ("charts with an open outline", c.open_outlines),
+            ("control corners without a side of the parting", c.no_side),
+        ]
+        .map(|(name, n)| (name.to_owned(), n as u64)),
+    );
+    let index: [Vec<u32>; 3] = std::array::from_fn(|k| found.hair.iter().map(|h| h[k]).collect());
+    let names = ["a", "b", "c"];
+    let mut columns: Vec<(&str, Column)> = names.into_iter().zip(index.map(Column::U32)).collect();
+    columns.extend(vector_columns(["wa", "wb", "wc"], &found.weight));
+    let file = encode("control hairs a, b, c of every hair and their weights", &[table("hair", columns)]);
+    run.keep(what, counts, &[("data.ply", &file)])?;
+    Ok((found.hair, found.weight))
+}
+
+fn decode_weights(bytes: &[u8]) -> Option<Weights> {
+    let file = decode(bytes)?;
+    let t = file.get("hair")?;
+    let (a, b, c) = (t.u32("a")?, t.u32("b")?, t.u32("c")?);
+    Some(((0..t.rows).map(|i| [a[i], b[i], c[i]]).collect(), vectors_of(t, ["wa", "wb", "wc"])?))
+}
+
+fn feature_map(run: &Runner<'_>, f: &Feature) -> Result<Option<TiledMap>, Error> {
+    let map = f.map.clone().map(|map| MapRef { map, channel: f.channel, wrap: f.wrap });
+    map.map(|m| run.map(&m)).transpose()
+}
+
+/// A column of one number per hair: length in scene units, root diameter in micrometres, opacity.
+pub fn column(run: &mut Runner<'_>, what: What, i: usize) -> Result<Vec<f32>, Error> {
+    let layer = &run.project.groom.value.layer[i];
+    let (name, feature) = match what {
+        What::Length(_) => ("length", layer.length.clone()),
+        What::Width(_) => ("width", layer.width.feature()),
+        What::Opacity(_) => ("opacity", layer.opacity.clone()),
+        other => unreachable!("{other:?} is not a column"),
+    };
+    let read = |bytes: &Vec<u8>| Some(decode(bytes)?.get("hair")?.f32(name)?.to_vec());
+    if let Some(found) = run.fetch(what).and_then(|e| read(e.payload.first()?)) {
+        return Ok(found);
+    }
+    let roots = roots(run, i)?;
+    let map = feature_map(run, &feature)?;
+    let source = FeatureSource {
+        value: feature.value as f32,
+        map: map.as_ref(),
+        noise: feature.noise as f32,
+        channel: rng::channel(name),
+    };
+    let values = feature_column(&roots, &source, u64::from(layer_seed(&layer.name)));
+    let file = encode(&format!("{name} of every hair"), &[table("hair", vec![(name, Column::F32(values.clone()))])]);
+    run.keep(what, Counts::new(), &[("data.ply", &file)])?;
+    Ok(values)
+}
+
+/// Linear colour of every hair.
+pub fn color(run: &mut Runner<'_>, i: usize) -> Result<Vec<[f32; 3]>, Error> {
+    let what = What::Color(i);
+    let read = |bytes: &Vec<u8>| vectors_of(decode(bytes)?.get("hair")?, ["r", "g", "b"]);
+    if let Some(found) = run.fetch(what).and_then(|e| read(e.payload.first()?)) {
+        return Ok(found);
+    }
+    let roots = roots(run, i)?;
+    let color = &run.project.groom.value.layer[i].color;
+    let map = color.map.clone().map(|map| MapRef { map, channel: Default::default(), wrap: color.wrap });
+    let map = map.map(|m| super::skin::read_map(&run.project.maps[&m.map], &m, true)).transpose()?;
+    let value = color.value.map(|x| x as f32);
+    let seed = u64::from(layer_seed(&run.project.groom.value.layer[i].name));
+    let values = colour_column(&roots, value, map.as_ref(), color.noise as f32, rng::channel("color"), seed);
+    let file = encode("linear colour of every hair", &[table("hair", vector_columns(["r", "g", "b"], &values))]);
+    run.keep(what, Counts::new(), &[("data.ply", &file)])?;
+    Ok(values)
+}

@@ -1,0 +1,8 @@
+//! One test binary, so that everything links once.
+
+mod bad_input;
+mod command_line;
+mod determinism;
+mod golden;
+mod rows;
+mod samples;
