@@ -191,9 +191,7 @@ fn partition(slice: &mut [u32], left: impl Fn(u32) -> bool) -> usize {
 
 /// Sorts along axis `d` and cuts where the area left of the cut is closest to half.
 fn cut_sorted(slice: &mut [u32], item: &[Item], d: usize) -> usize {
-    slice.sort_unstable_by(|&a, &b| {
-        item[a as usize].key[d].total_cmp(&item[b as usize].key[d]).then(a.cmp(&b))
-    });
+    slice.sort_unstable_by(|&a, &b| item[a as usize].key[d].total_cmp(&item[b as usize].key[d]).then(a.cmp(&b)));
     middle(slice.iter().map(|&t| f64::from(item[t as usize].area)))
 }
 

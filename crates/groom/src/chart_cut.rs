@@ -38,6 +38,8 @@ struct Marks {
     outline: BTreeMap<usize, u32>,
     /// Tail vertex of the edge in the direction of the parting.
     parting: BTreeMap<usize, usize>,
+    /// Parting through a vertex.
+    parting_of: BTreeMap<usize, u32>,
     /// False if an outline edge is missing.
     whole: bool,
 }
@@ -71,25 +73,38 @@ pub(crate) fn cut_chart(sites: &Sites, chart: &Chart, counts: &mut Triangulation
             continue;
         }
         let edges = face.adjacent_edges();
-        let hair = edges.map(|e| {
-            let [left, right] = pair(site_of[e.from().index()]);
-            if left == right {
-                return left;
-            }
-            let is_left = side(e, &marks).unwrap_or_else(|| {
-                counts.no_side += 1;
-                true
-            });
-            // Sides are those seen from outside in space.
-            if is_left != chart.mirrored { left } else { right }
-        });
         let site = edges.map(|e| site_of[e.from().index()]);
+        let mut is_left = [0, 1, 2].map(|i| {
+            let [left, right] = pair(site[i]);
+            (left != right).then(|| {
+                side(edges[i], &marks).unwrap_or_else(|| {
+                    counts.no_side += 1;
+                    true
+                })
+            })
+        });
+        unmix(&mut is_left, edges.map(|e| marks.parting_of.get(&e.from().index()).copied()), counts);
+        // Sides are those seen from outside in space.
+        let hair = [0, 1, 2].map(|i| pair(site[i])[usize::from(is_left[i] == Some(chart.mirrored))]);
         let k = (0..3).min_by_key(|&k| site[k]).unwrap_or(0);
         let turned = |x: [u32; 3]| [x[k], x[(k + 1) % 3], x[(k + 2) % 3]];
         cut.triangle.push((turned(site), turned(hair)));
     }
     cut.triangle.sort_unstable();
     cut
+}
+
+/// Where part of a parting is missing (it crossed the outline), a triangle can touch both its sides: the side of more
+/// corners gets all, the left one if there are as many.
+fn unmix(is_left: &mut [Option<bool>; 3], parting: [Option<u32>; 3], counts: &mut TriangulationCounts) {
+    for i in 0..3 {
+        let same: Vec<usize> = (0..3).filter(|&k| is_left[k].is_some() && parting[k] == parting[i]).collect();
+        let left = same.iter().filter(|&&k| is_left[k] == Some(true)).count();
+        if left != 0 && left != same.len() {
+            counts.mixed += 1;
+            same.iter().for_each(|&k| is_left[k] = Some(2 * left >= same.len()));
+        }
+    }
 }
 
 /// Exact in double precision; subnormal numbers, which the predicates cannot square, count as zero.
@@ -140,6 +155,7 @@ fn constrain(
         run.into_iter().for_each(|(edge, _)| *marks.outline.entry(edge).or_default() += 1);
     }
     for piece in &chart.partings {
+        marks.parting_of.extend(piece.site.iter().filter_map(|s| Some((*vertex_of.get(s)?, piece.parting))));
         for [a, b] in piece.site.windows(2).filter_map(|w| ends(w[0], w[1])) {
             let Some(run) = add(cdt, a, b) else {
                 counts.crossing += 1;
@@ -187,9 +203,8 @@ fn within(cdt: &Cdt, marks: &Marks, counts: &mut TriangulationCounts) -> Vec<boo
         return vec![true; cdt.num_all_faces()];
     }
     let odd = |e: usize| marks.outline.get(&e).is_some_and(|n| n % 2 == 1);
-    let closed = cdt.vertices().all(|v| {
-        v.out_edges().filter(|e| odd(e.as_undirected().fix().index())).count() % 2 == 0
-    });
+    let closed =
+        cdt.vertices().all(|v| v.out_edges().filter(|e| odd(e.as_undirected().fix().index())).count() % 2 == 0);
     if !marks.whole || !closed {
         counts.open_outlines += 1;
         return vec![true; cdt.num_all_faces()];

@@ -55,13 +55,7 @@ impl Density<'_> {
 
 /// The hairs of a layer: candidate i exists if and only if (i + 0.5) / area <= local density. `candidates` should hold
 /// at least [`Density::needed_candidates`]; `layer_seed` names the layer (top bit 0).
-pub fn roots(
-    mesh: &Mesh,
-    topology: &Topology,
-    candidates: &Candidates,
-    density: &Density,
-    layer_seed: u32,
-) -> Roots {
+pub fn roots(mesh: &Mesh, topology: &Topology, candidates: &Candidates, density: &Density, layer_seed: u32) -> Roots {
     let enough = density.needed_candidates(candidates.area).min(candidates.root.len());
     let textured = !mesh.corner_uv.is_empty();
     let chunks: Vec<Roots> = candidates.root[..enough]

@@ -53,6 +53,8 @@ pub struct TriangulationCounts {
     pub open_outlines: usize,
     /// Triangle corners at a parting whose side is not known; they took the left hair.
     pub no_side: usize,
+    /// Triangles that touched both sides of a parting, part of which crosses the outline; they took one side.
+    pub mixed: usize,
     /// Charts without any site.
     pub empty_charts: usize,
 }
@@ -124,6 +126,7 @@ impl TriangulationCounts {
         self.crossing += o.crossing;
         self.open_outlines += o.open_outlines;
         self.no_side += o.no_side;
+        self.mixed += o.mixed;
         self.empty_charts += o.empty_charts;
     }
 }

@@ -50,7 +50,7 @@ fn sphere(n: usize) -> Mesh {
 }
 
 fn all(mesh: &Mesh, count: usize) -> Candidates {
-    candidates(mesh, 7, count, &mut |_| true).unwrap()
+    candidates(mesh, &Topology::new(mesh), 7, count, &mut |_| true).unwrap()
 }
 
 fn map(n: usize, f: impl Fn(f64, f64) -> f64) -> TiledMap {
@@ -96,6 +96,26 @@ fn every_beginning_is_even_and_irregular() {
 }
 
 #[test]
+fn hairs_neither_line_up_along_an_open_edge_nor_shun_it() {
+    let mesh = flat(10);
+    let c = all(&mesh, 40_000);
+    for n in [10_000, 25_000, 40_000] {
+        let spacing = 1.0 / (n as f64).sqrt();
+        let edge = |r: &SurfacePoint| {
+            let p = mesh.point(r);
+            p.x.min(1.0 - p.x).min(p.y).min(1.0 - p.y)
+        };
+        // Hairs within a distance of the edge, over those of an equal share.
+        let share = |d: f64| {
+            let strip = 1.0 - (1.0 - 2.0 * d * spacing).powi(2);
+            c.root[..n].iter().filter(|r| edge(r) < d * spacing).count() as f64 / (n as f64 * strip)
+        };
+        let (row, strip) = (share(0.125), share(1.0));
+        assert!(row < 0.6 && strip > 0.9 && strip < 1.15, "{row} {strip}");
+    }
+}
+
+#[test]
 fn asking_for_more_only_appends_whatever_the_threads() {
     let mesh = sphere(10);
     let many = all(&mesh, 9_000);
@@ -106,13 +126,14 @@ fn asking_for_more_only_appends_whatever_the_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         assert_eq!(pool.install(|| all(&mesh, 9_000)), many);
     }
-    assert_ne!(candidates(&mesh, 8, 100, &mut |_| true).unwrap().root, many.root[..100]);
+    assert_ne!(candidates(&mesh, &Topology::new(&mesh), 8, 100, &mut |_| true).unwrap().root, many.root[..100]);
 }
 
 #[test]
 fn candidates_stop_when_told_and_need_area() {
     let mut calls = 0;
-    let stopped = candidates(&flat(3), 1, 100_000, &mut |n| {
+    let mesh = flat(3);
+    let stopped = candidates(&mesh, &Topology::new(&mesh), 1, 100_000, &mut |n| {
         calls += 1;
         n < 500
     });
@@ -200,7 +221,8 @@ fn counts_are_the_integral_of_density_for_any_map_resolution_and_chart_size() {
     let r = roots(&mesh, &topology, &c, &density, 1);
     assert_eq!(r.root.len(), 50_000);
     for chart in 0..2u32 {
-        let area: f64 = (0..topology.area.len()).filter(|&t| topology.chart[t] == chart).map(|t| topology.area[t]).sum();
+        let area: f64 =
+            (0..topology.area.len()).filter(|&t| topology.chart[t] == chart).map(|t| topology.area[t]).sum();
         let got = r.chart.iter().filter(|&&k| k == chart).count() as f64;
         assert!((got - area * density.value).abs() < 12.0, "chart {chart}: {got} of {}", area * density.value);
     }
@@ -212,9 +234,7 @@ fn a_higher_value_keeps_every_hair() {
     let topology = Topology::new(&mesh);
     let c = all(&mesh, 30_000);
     let (image, on) = (map(64, |u, v| u * v + 0.1), map(64, |u, _| if u < 0.3 { 3.0 } else { 0.4 }));
-    let make = |value: f64| {
-        roots(&mesh, &topology, &c, &Density { value, map: Some(&image), on_off: Some(&on) }, 5)
-    };
+    let make = |value: f64| roots(&mesh, &topology, &c, &Density { value, map: Some(&image), on_off: Some(&on) }, 5);
     let (few, many) = (make(100.0), make(200.0));
     assert!(few.id.len() > 1000 && many.id.len() > 3 * few.id.len() / 2);
     for (k, id) in few.id.iter().enumerate() {

@@ -121,12 +121,16 @@ fn location_equals_brute_force_with_an_outline_and_a_hole() {
     check_delaunay(&t, &s);
     assert_eq!((t.counts.open_outlines, t.counts.crossing), (0, 0));
     let polygon = |p: [f32; 2], ring: &[[f32; 2]]| {
-        (0..ring.len()).filter(|&i| {
-            let (a, b) = (ring[i], ring[(i + 1) % ring.len()]);
-            let up = (a[1] <= p[1]) && (b[1] > p[1]) && orient2d(c(a), c(b), c(p)) > 0.0;
-            let down = (a[1] > p[1]) && (b[1] <= p[1]) && orient2d(c(a), c(b), c(p)) < 0.0;
-            up || down
-        }).count() % 2 == 1
+        (0..ring.len())
+            .filter(|&i| {
+                let (a, b) = (ring[i], ring[(i + 1) % ring.len()]);
+                let up = (a[1] <= p[1]) && (b[1] > p[1]) && orient2d(c(a), c(b), c(p)) > 0.0;
+                let down = (a[1] > p[1]) && (b[1] <= p[1]) && orient2d(c(a), c(b), c(p)) < 0.0;
+                up || down
+            })
+            .count()
+            % 2
+            == 1
     };
     let (mut inside, mut outside) = (0, 0);
     for q in (0..4000).map(|i| random(i, 4).map(|x| 1.4 * x - 0.2)) {
@@ -256,7 +260,7 @@ fn no_triangle_mixes_the_sides_of_a_parting() {
         let s = parted(to_border);
         let t = triangulate(&s, &[mirrored]);
         check_delaunay(&t, &s);
-        assert_eq!((t.counts.crossing, t.counts.no_side), (0, 0));
+        assert_eq!((t.counts.crossing, t.counts.no_side, t.counts.mixed), (0, 0, 0));
         let path: Vec<Coord<f64>> = s.partings[0].site.iter().map(|&k| c(s.uv[k as usize])).collect();
         let mut seen = [0; 2];
         for (k, hair) in t.hair.iter().enumerate() {
@@ -270,14 +274,32 @@ fn no_triangle_mixes_the_sides_of_a_parting() {
                 seen[usize::from(is_left)] += 1;
                 // Near its corner the triangle lies above the parting, a function of x, if it is on the left.
                 let [a, b, d] = [0, 1, 2].map(|j| c(t.uv[k][(i + j) % 3]));
-                let q = Coord {
-                    x: a.x + 1e-3 * ((b.x - a.x) + (d.x - a.x)),
-                    y: a.y + 1e-3 * ((b.y - a.y) + (d.y - a.y)),
-                };
+                let q =
+                    Coord { x: a.x + 1e-3 * ((b.x - a.x) + (d.x - a.x)), y: a.y + 1e-3 * ((b.y - a.y) + (d.y - a.y)) };
                 let on = path.windows(2).find(|w| w[0].x <= q.x && q.x <= w[1].x).unwrap();
                 assert_eq!(orient2d(on[0], on[1], q) > 0.0, is_left, "triangle {k} corner {i}");
             }
         }
         assert!(seen[0] > 10 && seen[1] > 10);
+    }
+}
+
+#[test]
+fn a_parting_that_crosses_the_outline_still_mixes_nothing() {
+    // A star: the straight way between its arms leaves it.
+    let mut s = sites(&ring(16, [0.5, 0.2]));
+    close(&mut s, 0, 16);
+    let arm = |i: usize, r: f64| {
+        let a = std::f64::consts::TAU * i as f64 / 16.0;
+        [(0.5 + r * libm::cos(a)) as f32, (0.5 + r * libm::sin(a)) as f32]
+    };
+    let way = [arm(0, 0.1), arm(0, 0.3), arm(0, 0.38), arm(2, 0.38), arm(2, 0.3), arm(2, 0.1)];
+    let site = way.iter().enumerate().map(|(k, &p)| s.push(0, p, [100 + 2 * k as u32, 101 + 2 * k as u32])).collect();
+    s.partings.push(PartingPiece { parting: 0, chart: 0, site });
+    let t = triangulate(&s, &[false]);
+    assert!(t.counts.crossing > 0 && t.counts.open_outlines == 0);
+    for hair in &t.hair {
+        let sides: Vec<u32> = hair.iter().filter(|&&h| h >= 100).map(|h| h % 2).collect();
+        assert!(sides.windows(2).all(|w| w[0] == w[1]), "{hair:?}");
     }
 }
