@@ -1,5 +1,6 @@
 //! Small shots made in a temporary folder, and the command to run over them.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -64,12 +65,116 @@ impl ShotFolder {
         let text = self.succeed(&[&["run", "--json", "--quiet"], arguments].concat());
         serde_json::from_str(&text).expect("a report")
     }
+
+    /// Names of the steps that `pelage plan` says would run, and its reasons.
+    pub fn plan(&self, arguments: &[&str]) -> (BTreeSet<String>, BTreeSet<String>) {
+        let text = self.succeed(&[&["plan", "--json"], arguments].concat());
+        let stages: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+        let all = |key: &str| {
+            let lists = stages.as_array().expect("stages").iter().map(|s| s[key].as_array().expect("a list"));
+            lists.flatten().map(|v| v.as_str().expect("text").to_owned()).collect()
+        };
+        (all("run"), all("reasons"))
+    }
+
+    /// The same inputs in another folder, without results and cache.
+    pub fn fresh(&self) -> ShotFolder {
+        let other =
+            ShotFolder { folder: tempfile::tempdir().expect("a temporary folder"), command: self.command.clone() };
+        for (name, bytes) in files_below(self.path()) {
+            if !name.starts_with("out/") && !name.starts_with(".pelage-cache/") {
+                other.write(&name, bytes);
+            }
+        }
+        other
+    }
+
+    /// Every file of the output folder but the report, whose times differ from run to run.
+    pub fn outputs(&self) -> BTreeMap<String, Vec<u8>> {
+        let mut found = files_below(&self.path().join("out"));
+        found.retain(|name, _| !name.ends_with("/report.json"));
+        found
+    }
+
+    /// Every file of every finished step in the cache.
+    pub fn entries(&self) -> BTreeMap<String, Vec<u8>> {
+        files_below(&self.path().join(".pelage-cache/v1/entries"))
+    }
+
+    /// Files that only an unfinished run has: none are left when it has ended.
+    pub fn leftovers(&self) -> Vec<String> {
+        let unfinished = |n: &String| n.ends_with(".part") || n.contains("/v1/tmp/");
+        files_below(self.path()).into_keys().filter(unfinished).collect()
+    }
+}
+
+/// Files below a folder, by path from it.
+pub fn files_below(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(at) = folders.pop() {
+        for entry in std::fs::read_dir(&at).into_iter().flatten() {
+            let path = entry.expect("a directory entry").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let name = path.strip_prefix(folder).expect("below the folder").to_string_lossy().into_owned();
+                found.insert(name, std::fs::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display())));
+            }
+        }
+    }
+    found
+}
+
+/// One exported hair: where it stands, and every other number that the file has of it, bit by bit.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ExportedHair {
+    /// Face of the skin and texture coordinates of the root.
+    pub root: (i32, [u32; 2]),
+    /// Weights on the face, rest points, and positions and velocities at every frame.
+    pub shape: Vec<u32>,
+    /// Diameters, colour and opacity.
+    pub look: Vec<u32>,
+}
+
+impl ExportedHair {
+    /// Texture coordinates of the root.
+    pub fn uv(&self) -> [f32; 2] {
+        self.root.1.map(f32::from_bits)
+    }
+}
+
+/// Every hair of an exported `hair.mcap` by layer and id.
+pub fn exported_hairs(file: &Path) -> BTreeMap<(String, u64), ExportedHair> {
+    fn bits<'a>(values: impl IntoIterator<Item = &'a [f32; 3]>) -> impl Iterator<Item = u32> {
+        values.into_iter().flatten().map(|x| x.to_bits()).collect::<Vec<_>>().into_iter()
+    }
+    let mut read = pelage::format::mcap::read_hair_mcap(file).expect("an exported file");
+    let names: Vec<String> = read.layer_names().map(str::to_owned).collect();
+    let mut hairs = BTreeMap::new();
+    for (l, name) in names.iter().enumerate() {
+        let layer = read.layer(l).expect("a layer");
+        let frames: Vec<_> = (0..read.facts().frames.len()).map(|f| read.frame(f, l).expect("a frame")).collect();
+        for (i, id) in layer.id.iter().enumerate() {
+            let points = layer.offsets.range(i);
+            let mut shape: Vec<u32> = layer.skin_bary[i].iter().map(|x| x.to_bits()).collect();
+            shape.extend(bits(&layer.rest[points.clone()]));
+            for f in &frames {
+                shape.extend(bits(&f.position[points.clone()]).chain(bits(&f.velocity[points.clone()])));
+            }
+            let mut look: Vec<u32> = layer.width[points].iter().map(|x| x.to_bits()).collect();
+            look.extend(bits([&layer.color[i]]).chain([layer.opacity[i].to_bits()]));
+            let hair = ExportedHair { root: (layer.skin_face[i], layer.root_uv[i].map(f32::to_bits)), shape, look };
+            assert!(hairs.insert((name.clone(), *id), hair).is_none(), "hair {id} of {name} is there twice");
+        }
+    }
+    hairs
 }
 
 /// An ASCII PLY of a mesh, written independently of the code under test: one vertex per (position, uv) pair.
 pub fn ascii_ply(mesh: &pelage_geom::Mesh) -> String {
     let mut vertices: Vec<String> = Vec::new();
-    let mut index = std::collections::BTreeMap::new();
+    let mut index = BTreeMap::new();
     let mut faces = String::new();
     for (t, triangle) in mesh.triangle.iter().enumerate() {
         let corners: Vec<String> = (0..3)
@@ -153,7 +258,12 @@ pub fn small_shot(command: &str, frames: u32) -> ShotFolder {
     let mut csv = String::from("time_s,tx,ty,tz,qx,qy,qz,qw\n");
     for f in 0..=frames {
         let (t, angle) = (f64::from(f) / 24.0, 0.05 * f64::from(f));
-        csv.push_str(&format!("{t},{},0,0,0,{},0,{}\n", 0.001 * f64::from(f), (0.5 * angle).sin(), (0.5 * angle).cos()));
+        csv.push_str(&format!(
+            "{t},{},0,0,0,{},0,{}\n",
+            0.001 * f64::from(f),
+            (0.5 * angle).sin(),
+            (0.5 * angle).cos()
+        ));
     }
     shot.write("grooms/ball.csv", csv);
     shot.write("maps/half.png", grey_png(64, 64, |x, _| if x < 32 { 255 } else { 96 }));

@@ -13,6 +13,21 @@ pub fn unfinished(path: &Path) -> PathBuf {
     path.with_file_name(format!(".{name}.{}-{n}.part", std::process::id()))
 }
 
+/// Removes files that killed processes left unfinished in a folder.
+pub fn clear_unfinished(folder: &Path) {
+    for file in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = file.file_name().to_string_lossy().into_owned();
+        // ".<name>.<process>-<count>.part", as `unfinished` has it; no other file is touched.
+        let number = name.strip_prefix('.').and_then(|n| n.strip_suffix(".part")).and_then(|n| n.rsplit_once('.'));
+        let ours = number.and_then(|n| n.1.split_once('-')).is_some_and(|(process, count)| {
+            [process, count].iter().all(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
+        });
+        if ours {
+            let _ = std::fs::remove_file(file.path());
+        }
+    }
+}
+
 /// Writes a file beside its place and renames it there once it is complete.
 pub fn write_whole(
     path: &Path,

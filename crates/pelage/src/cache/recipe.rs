@@ -97,10 +97,11 @@ impl Recipe {
                 Some(o) if f.is_hash => out.push(format!("{} added", or(&f.label, &o.label))),
                 Some(o) if o.is_hash => out.push(format!("{} taken out", o.label)),
                 Some(o) => out.push(format!("{} {} -> {}", f.label, o.value, f.value)),
+                None if f.is_step => {}
                 None => out.push(format!("{} added", f.label)),
             }
         }
-        let gone = before.fields.iter().filter(|o| !self.fields.iter().any(|f| f.name == o.name));
+        let gone = before.fields.iter().filter(|o| !o.is_step && !self.fields.iter().any(|f| f.name == o.name));
         out.extend(gone.map(|o| format!("{} taken out", o.label)));
         out
     }

@@ -63,6 +63,11 @@ static TEMPORARY: AtomicU64 = AtomicU64::new(0);
 impl Store {
     /// Opens (and makes) a cache folder. Leftovers of killed runs are cleared when no other run is using it.
     pub fn open(cache: &Path) -> io::Result<Self> {
+        Self::open_clearing(cache, &[])
+    }
+
+    /// The same, and clears unfinished files in further folders that runs over this cache write into.
+    pub fn open_clearing(cache: &Path, folders: &[&Path]) -> io::Result<Self> {
         let root = cache.join("v1");
         std::fs::create_dir_all(root.join("entries"))?;
         std::fs::create_dir_all(root.join("tmp"))?;
@@ -71,6 +76,9 @@ impl Store {
         if lock.try_lock().is_ok() {
             for left in std::fs::read_dir(root.join("tmp"))?.flatten() {
                 let _ = std::fs::remove_dir_all(left.path());
+            }
+            for folder in [cache, &root.join("last")].iter().chain(folders) {
+                crate::files::clear_unfinished(folder);
             }
             lock.unlock()?;
         }

@@ -3,7 +3,7 @@
 use super::Stage;
 use crate::cache::{Field, Recipe};
 use crate::config::{Comb, ExportFormat, Feature, MapRef, Parting};
-use crate::project::{Project, SkinAt};
+use crate::project::{Project, SkinAt, frame_list};
 use std::collections::BTreeMap;
 
 /// What a step makes. Layers are numbered as in the groom file.
@@ -105,11 +105,20 @@ impl Plan {
                 plan.add(what, name(part), Stage::Instance, recipe, reads);
             };
             let column = |part: &str, f: &Feature| {
-                Recipe::new(&format!("instance/{part}"), version::COLUMN).with(r.feature(part, &format!("layer[{i}].{part}"), f))
+                Recipe::new(&format!("instance/{part}"), version::COLUMN).with(r.feature(
+                    part,
+                    &format!("layer[{i}].{part}"),
+                    f,
+                ))
             };
             add(What::Candidates(i), "candidates", r.candidates(i), &[]);
             add(What::Roots(i), "roots", r.roots(i), &[What::Candidates(i)]);
-            add(What::Weights(i), "weights", Recipe::new("instance/weights", version::WEIGHTS), &[What::Place, What::Roots(i)]);
+            add(
+                What::Weights(i),
+                "weights",
+                Recipe::new("instance/weights", version::WEIGHTS),
+                &[What::Place, What::Roots(i)],
+            );
             add(What::Length(i), "length", column("length", &layer.length), &[What::Roots(i)]);
             add(What::Width(i), "width", column("width", &layer.width.feature()), &[What::Roots(i)]);
             add(What::Opacity(i), "opacity", column("opacity", &layer.opacity), &[What::Roots(i)]);
@@ -142,9 +151,12 @@ impl Plan {
             look.iter().copied().chain(frames).collect::<Vec<What>>()
         };
         let still = of(&[project.still_frame()]);
-        plan.add(What::Still, "preview/still".into(), Stage::Preview, r.picture(), &still);
+        let picture = r.picture().param("frame", project.still_frame(), r.in_shot("preview.frame"));
+        plan.add(What::Still, "preview/still".into(), Stage::Preview, picture, &still);
         let sheet = of(&project.sheet_frames());
-        plan.add(What::Sheet, "preview/sheet".into(), Stage::Preview, r.picture().param("sheet", true, ""), &sheet);
+        let pictures =
+            r.picture().param("sheet", frame_list(&project.sheet_frames()), r.in_shot("preview.sheet (frames)"));
+        plan.add(What::Sheet, "preview/sheet".into(), Stage::Preview, pictures, &sheet);
         plan
     }
 
@@ -178,6 +190,17 @@ impl Plan {
             }
         }
         out
+    }
+}
+
+impl What {
+    /// The layer that it belongs to, if it belongs to one.
+    pub fn layer(self) -> Option<usize> {
+        match self {
+            What::Candidates(i) | What::Roots(i) | What::Weights(i) | What::Rest(i) | What::Frame(i, _) => Some(i),
+            What::Length(i) | What::Width(i) | What::Opacity(i) | What::Color(i) => Some(i),
+            What::Place | What::Comb | What::Export(_) | What::Still | What::Sheet => None,
+        }
     }
 }
 
@@ -252,7 +275,11 @@ impl Reader<'_> {
             r = r.file("curves", &drawn.hash, drawn.label.clone());
         }
         for (i, Parting { points, .. }) in self.project.groom.value.parting.iter().enumerate() {
-            r = r.param(&format!("parting[{i}]"), format!("{points:?}"), self.in_groom(&format!("parting[{i}].points")));
+            r = r.param(
+                &format!("parting[{i}]"),
+                format!("{points:?}"),
+                self.in_groom(&format!("parting[{i}].points")),
+            );
         }
         r
     }
@@ -365,11 +392,9 @@ impl Reader<'_> {
     fn picture(&self) -> Recipe {
         let p = &self.project.shot.value.preview;
         let mut r = self.rest(Recipe::new("preview", version::PREVIEW));
-        for (key, value) in [
-            ("size", format!("{:?}", p.size)),
-            ("from", format!("{:?}", p.from)),
-            ("zoom", p.zoom.to_string()),
-        ] {
+        for (key, value) in
+            [("size", format!("{:?}", p.size)), ("from", format!("{:?}", p.from)), ("zoom", p.zoom.to_string())]
+        {
             r = r.param(key, value, self.in_shot(&format!("preview.{key}")));
         }
         for (i, layer) in self.project.groom.value.layer.iter().enumerate() {

@@ -78,7 +78,7 @@ impl<'a> Runner<'a> {
             }
         }
         let cache = project.cache_dir();
-        let store = Store::open(&cache).map_err(Error::disk(&cache))?;
+        let store = Store::open_clearing(&cache, &[&project.out_dir()]).map_err(Error::disk(&cache))?;
         let last = store.last(&project.shot.value.shot.name);
         Ok(Runner {
             project,
@@ -149,17 +149,49 @@ impl<'a> Runner<'a> {
         Stage::ALL.into_iter().filter(|s| *s <= to && self.options.without != Some(*s)).collect()
     }
 
-    /// Why the steps run, each reason once.
+    /// Why steps of a stage run, each reason once. A shot's first run needs none.
     fn reasons(&self, steps: &[Step]) -> Vec<String> {
         let mut out: Vec<String> = Vec::new();
+        if self.last.is_empty() {
+            return out;
+        }
         for step in steps {
-            for reason in self.plan.reasons(step.what, &self.last) {
+            for reason in self.plan.reasons(step.what, &self.last).into_iter().chain(self.own_reason(step)) {
                 if !out.contains(&reason) {
                     out.push(reason);
                 }
             }
         }
+        let new = |s: &&Step| !self.last.contains_key(&s.name) && !self.in_new_layer(s);
+        let frame = |s: &Step| if let What::Frame(_, f) = s.what { Some(f) } else { None };
+        let frames: BTreeSet<i32> = steps.iter().filter(new).filter_map(frame).collect();
+        if !frames.is_empty() {
+            out.push(format!("new: frame {}", frame_list(&frames.into_iter().collect::<Vec<_>>())));
+        }
         out
+    }
+
+    fn in_new_layer(&self, step: &Step) -> bool {
+        step.what.layer().is_some_and(|i| !self.last.contains_key(&self.plan.step(What::Roots(i)).name))
+    }
+
+    /// Why a step runs, if it is not for something that it reads.
+    fn own_reason(&self, step: &Step) -> Option<String> {
+        if self.options.force == Some(step.stage) {
+            return Some(format!("--force {}", step.stage.name()));
+        }
+        if self.in_new_layer(step) {
+            let layer = &self.project.groom.value.layer[step.what.layer()?];
+            return Some(format!("new: layer {}", layer.name));
+        }
+        match (self.last.get(&step.name), step.stage) {
+            (None, Stage::Export) => Some(format!("new: {}", step.name)),
+            (Some(last), stage) if last.key() == step.recipe.key() => Some(match stage {
+                Stage::Export | Stage::Preview => format!("files of {} are missing or not as written", step.name),
+                stage => format!("results of {} are missing from the cache", stage.name()),
+            }),
+            _ => None,
+        }
     }
 
     /// Frames that a whole-shot file still waits for.
@@ -187,7 +219,8 @@ impl<'a> Runner<'a> {
     /// Brings everything up to date.
     pub fn run(&mut self) -> Result<Report, Error> {
         let shot = self.project.shot.value.shot.name.clone();
-        let mut report = Report { shot: shot.clone(), version: env!("CARGO_PKG_VERSION").to_owned(), stages: Vec::new() };
+        let mut report =
+            Report { shot: shot.clone(), version: env!("CARGO_PKG_VERSION").to_owned(), stages: Vec::new() };
         let names: BTreeSet<String> = self.plan.steps.iter().map(|s| s.name.clone()).collect();
         let mut last = self.last.clone();
         last.retain(|name, _| names.contains(name));
