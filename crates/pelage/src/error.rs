@@ -64,7 +64,12 @@ impl Error {
                 let mut text = String::new();
                 let handler = miette::GraphicalReportHandler::new_themed(miette::GraphicalTheme::unicode_nocolor());
                 match handler.render_report(&mut text, e.as_ref()) {
-                    Ok(()) => format!("error: {e}\n{text}"),
+                    // Without its first lines, which say the same as ours.
+                    Ok(()) => {
+                        let rest = text.lines().skip_while(|l| !l.contains("╭─") && !l.starts_with("  help:"));
+                        let rest = rest.map(|l| format!("\n{}", l.trim_end())).collect::<String>();
+                        format!("error: {e}{}", rest.trim_end())
+                    }
                     Err(_) => format!("error: {e}{}", with(&e.help)),
                 }
             }

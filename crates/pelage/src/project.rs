@@ -8,6 +8,9 @@ use pelage_geom::motion::RigidTransform;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+/// Farthest that a skin may be from the scene's origin, scene units: what single precision can still square.
+const FARTHEST: f64 = 1e18;
+
 /// An input file and what is in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InputFile {
@@ -52,6 +55,13 @@ impl Project {
     pub fn open(shot_file: &Path) -> Result<Self, Error> {
         let shot: Document<ShotFile> = Document::read(shot_file)?;
         shot.check()?;
+        let folders = [("cache.dir", &shot.value.cache.dir), ("export.dir", &shot.value.export.dir)];
+        for (key, folder) in folders.map(|(key, written)| (key, shot.resolve(written))) {
+            if folder.exists() && !folder.is_dir() {
+                let what = format!("{} is not a folder", folder.display());
+                return Err(shot.error(key, what, "name a folder; it is made if it is absent").into());
+            }
+        }
         let groom_path = shot.resolve(&shot.value.groom.file);
         if !groom_path.is_file() {
             return Err(missing(&shot, "groom.file", &groom_path).into());
@@ -195,8 +205,15 @@ impl Finder<'_> {
             let file = self.file(doc, "skin.motion", path)?;
             let motion = csv::read_motion(&file.path, shot.meters_per_unit, shot.fps)?;
             let start = skin.motion_start.unwrap_or(f64::from(shot.frames[0]));
-            let at = |f: i32| SkinAt::Rigid(motion.at((f64::from(f) - start) / shot.fps, skin.pivot));
-            return Ok(range.map(|f| (f, at(f))).collect());
+            let at = |f: i32| {
+                let t = motion.at((f64::from(f) - start) / shot.fps, skin.pivot);
+                if t.translation.iter().chain(&t.pivot).all(|x| x.abs() <= FARTHEST) {
+                    return Ok((f, SkinAt::Rigid(t)));
+                }
+                let what = format!("{} moves the skin out of all bounds at frame {f}", file.label);
+                Err(doc.error("skin.motion", what, "translations are in metres; check skin.pivot too").into())
+            };
+            return range.map(at).collect();
         }
         let Some(pattern) = &skin.frames else {
             return Ok(range.map(|f| (f, SkinAt::Rest)).collect());

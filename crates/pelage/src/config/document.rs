@@ -1,7 +1,7 @@
 //! A configuration file: its text, what it says, and where it says it.
 
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceSpan};
-use serde::de::DeserializeOwned;
+use serde::de::{Deserialize, DeserializeOwned, Deserializer, Error as _};
 use std::path::{Path, PathBuf};
 use toml::de::{DeTable, DeValue};
 
@@ -50,6 +50,28 @@ impl ConfigError {
         let at = self.span?.offset().min(self.source.inner().len());
         Some(self.source.inner()[..at].matches('\n').count() + 1)
     }
+}
+
+/// An array of exactly N values. Plain arrays take the first N of a longer list and drop the rest in silence.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fixed<T, const N: usize>(pub [T; N]);
+
+impl<'de, T: Deserialize<'de>, const N: usize> Deserialize<'de> for Fixed<T, N> {
+    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+        let list = Vec::<T>::deserialize(d)?;
+        let found = list.len();
+        let wrong = |_| D::Error::invalid_length(found, &format!("an array of {N} values").as_str());
+        list.try_into().map(Fixed).map_err(wrong)
+    }
+}
+
+/// Reads an array of exactly N values.
+pub fn exactly<'de, D, T, const N: usize>(d: D) -> Result<[T; N], D::Error>
+where
+    D: Deserializer<'de>,
+    T: Deserialize<'de>,
+{
+    Fixed::deserialize(d).map(|f| f.0)
 }
 
 /// A parsed file with its text, kept to point into.

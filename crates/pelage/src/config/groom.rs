@@ -1,8 +1,8 @@
 //! The groom file: control hairs, how they are combed, and the layers of hair grown from maps.
 
-use super::document::{ConfigError, Document};
+use super::document::{ConfigError, Document, Fixed, exactly};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer};
 use std::path::PathBuf;
 
 /// A look: control hairs and the layers of hair that follow them.
@@ -59,6 +59,7 @@ pub struct Placement {
     /// Control hairs per square centimetre of skin.
     pub per_cm2: Option<f64>,
     /// Counts along u and along v, on every chart.
+    #[serde(default, deserialize_with = "grid")]
     pub grid: Option<[usize; 2]>,
     /// Curves drawn elsewhere (USD, PLY or .hair), bound to the skin.
     pub curves: Option<PathBuf>,
@@ -71,7 +72,20 @@ pub struct Parting {
     /// Name, for comb operations that act on one side.
     pub name: String,
     /// Points on or near the rest skin, scene units, in order.
+    #[serde(deserialize_with = "points")]
     pub points: Vec<[f64; 3]>,
+}
+
+fn grid<'de, D: Deserializer<'de>>(d: D) -> Result<Option<[usize; 2]>, D::Error> {
+    exactly(d).map(Some)
+}
+
+fn points<'de, D: Deserializer<'de>>(d: D) -> Result<Vec<[f64; 3]>, D::Error> {
+    Ok(Vec::<Fixed<f64, 3>>::deserialize(d)?.into_iter().map(|p| p.0).collect())
+}
+
+fn some_points<'de, D: Deserializer<'de>>(d: D) -> Result<Option<Vec<[f64; 3]>>, D::Error> {
+    points(d).map(Some)
 }
 
 /// One combing operation. Which keys it reads depends on its kind.
@@ -86,6 +100,7 @@ pub struct Comb {
     /// Painted strength: a map that multiplies the weight.
     pub region: Option<MapRef>,
     /// direction-curve: the curve at the rest pose, scene units, in the direction of combing.
+    #[serde(default, deserialize_with = "some_points")]
     pub points: Option<Vec<[f64; 3]>>,
     /// direction-curve: region of influence around the curve, scene units. Default: everywhere.
     pub radius: Option<f64>,
@@ -253,6 +268,7 @@ impl WidthFeature {
 #[serde(deny_unknown_fields)]
 pub struct ColorFeature {
     /// Linear red, green, blue, 0 to 1. Multiplies the map.
+    #[serde(deserialize_with = "exactly")]
     pub value: [f64; 3],
     /// Colour image (sRGB if 8 or 16 bit); `<UDIM>` stands for the tile number.
     pub map: Option<PathBuf>,
@@ -327,10 +343,10 @@ impl Document<GroomFile> {
         }
         for (i, l) in self.value.layer.iter().enumerate() {
             let key = format!("layer[{i}]");
-            if l.name.is_empty() || self.value.layer[..i].iter().any(|m| m.name == l.name) {
+            if l.name.is_empty() || l.name.chars().any(char::is_control) || self.value.layer[..i].iter().any(|m| m.name == l.name) {
                 return Err(self.error(
                     &format!("{key}.name"),
-                    "is empty or used twice",
+                    "is empty, used twice or not one line of text",
                     "name every layer differently",
                 ));
             }

@@ -1,6 +1,6 @@
 //! The shot file, `pipeline.toml`.
 
-use super::document::{ConfigError, Document};
+use super::document::{ConfigError, Document, exactly};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::path::PathBuf;
@@ -33,6 +33,7 @@ pub struct Shot {
     /// Name; outputs go to a folder of that name.
     pub name: String,
     /// First and last frame, both included.
+    #[serde(deserialize_with = "exactly")]
     pub frames: [i32; 2],
     /// Frames per second.
     pub fps: f64,
@@ -65,7 +66,7 @@ pub struct Skin {
     /// The frame at which the motion's time is 0. Default: the shot's first frame.
     pub motion_start: Option<f64>,
     /// Point in scene units that the motion's rotation leaves in place. Default: the origin.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "exactly")]
     pub pivot: [f64; 3],
     /// PLY per frame with the rest pose's vertices, `#` standing for the frame number: "anim/bust.####.ply".
     pub frames: Option<PathBuf>,
@@ -114,8 +115,10 @@ pub struct Preview {
     /// Frame of the still. Default: the middle of the shot.
     pub frame: Option<i32>,
     /// Width and height in pixels. Default: `[1280, 960]`.
+    #[serde(deserialize_with = "exactly")]
     pub size: [u32; 2],
     /// Direction from the subject to the camera. Default: from the front, a little to the side and above.
+    #[serde(deserialize_with = "exactly")]
     pub from: [f64; 3],
     /// Pictures in the contact sheet of `pelage preview`. Default: 8.
     pub sheet: u32,
@@ -159,14 +162,21 @@ impl Document<ShotFile> {
         if i64::from(s.shot.frames[1]) - i64::from(s.shot.frames[0]) >= 1_000_000 {
             return bad("shot.frames", "is more than a million frames", "write [first, last]");
         }
-        if !positive(s.shot.fps) {
-            return bad("shot.fps", "must be above 0", "24 is film");
+        if !(1e-6..=1e6).contains(&s.shot.fps) {
+            return bad("shot.fps", "must be between 0.000001 and 1000000", "24 is film");
         }
-        if !positive(s.shot.meters_per_unit) {
-            return bad("shot.meters_per_unit", "must be above 0", "1 for metres, 0.01 for centimetres");
+        if !(1e-9..=1e9).contains(&s.shot.meters_per_unit) {
+            return bad(
+                "shot.meters_per_unit",
+                "must be between 1e-9 and 1e9",
+                "1 for metres, 0.01 for centimetres",
+            );
         }
         if s.skin.motion.is_some() && s.skin.frames.is_some() {
             return bad("skin.motion", "can't go together with skin.frames", "keep one of the two");
+        }
+        if s.skin.motion_start.is_some_and(|x| !x.is_finite()) {
+            return bad("skin.motion_start", "must be a finite number", "it is the frame at which the motion's time is 0");
         }
         if s.skin.frames.as_ref().is_some_and(|f| f.to_string_lossy().matches('#').count() == 0) {
             return bad("skin.frames", "has no # for the frame number", "write for example \"anim/bust.####.ply\"");

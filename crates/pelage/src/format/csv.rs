@@ -77,7 +77,8 @@ fn parse_motion(path: &Path, text: &str, meters_per_unit: f64, fps: f64) -> Resu
 /// For each of [`COLUMNS`] where it stands and what the header calls it.
 fn columns(header: &str) -> Result<Vec<(usize, &'static str)>, String> {
     let cells: Vec<String> = header.split(',').map(|c| unquote(c).to_ascii_lowercase()).collect();
-    if let Some((k, name)) = cells.iter().enumerate().find(|(k, c)| !c.is_empty() && cells[..*k].contains(c)) {
+    let read = |c: &String| COLUMNS.contains(&c.as_str()) || c == "frame";
+    if let Some((k, name)) = cells.iter().enumerate().find(|(k, c)| read(c) && cells[..*k].contains(c)) {
         return Err(format!("column '{name}' stands twice (the second is column {})", k + 1));
     }
     let find = |name: &'static str| cells.iter().position(|c| c == name).map(|k| (k, name));

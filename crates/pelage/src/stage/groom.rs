@@ -1,6 +1,7 @@
 //! Groom: control hairs placed on the rest skin and combed.
 
 use super::run::{Counts, Runner};
+use super::skin::Texel;
 use super::tables::{self, decode, encode, root_columns, roots_of, table, vector_columns, vectors_of};
 use super::{Skin, What};
 use crate::Error;
@@ -17,6 +18,9 @@ use std::rc::Rc;
 
 /// Seed of the blue-noise roots of control hairs; no layer's seed has the upper half set.
 const CONTROL_SEED: u64 = 1 << 32;
+
+/// Control hairs are combed by a person: more of them are a mistake of units.
+const MAX_CONTROL: usize = 10_000_000;
 
 /// The rest skin, read once a run.
 pub fn skin(run: &mut Runner<'_>) -> Result<Rc<Skin>, Error> {
@@ -88,13 +92,18 @@ fn place_hairs(run: &mut Runner<'_>) -> Result<(ControlHairs, Sites, Counts), Er
     let groom = &run.project.groom.value;
     let (_, length) = run.project.control_length();
     let length_map = length.map.clone().map(|map| MapRef { map, channel: length.channel, wrap: length.wrap });
-    let length_map = length_map.map(|m| run.map(&m)).transpose()?;
+    let length_map = length_map.map(|m| run.map(&m, Texel::Value)).transpose()?;
     let partings: Vec<Vec<Vec3>> = partings(run);
     let p = &groom.control.placement;
     let per_unit2 = p.per_cm2.unwrap_or(0.0) * run.project.cm2_per_unit2();
     let root: Vec<SurfacePoint> = match p.per_cm2 {
         Some(_) => {
             let count = (per_unit2 * skin.area()).round() as usize;
+            if count > MAX_CONTROL {
+                let what = format!("asks for {count} control hairs on this skin, at most {MAX_CONTROL} are placed");
+                let help = "lower it, or check shot.meters_per_unit";
+                return Err(run.project.groom.error("control.placement.per_cm2", what, help).into());
+            }
             candidates(&skin.mesh, &skin.topology, CONTROL_SEED, count, &mut |_| true).map(|c| c.root).unwrap_or_default()
         }
         None => Vec::new(),
@@ -126,6 +135,14 @@ fn place_hairs(run: &mut Runner<'_>) -> Result<(ControlHairs, Sites, Counts), Er
         ("drawn hairs without length", c.skipped_short),
     ] {
         counts.insert(name.to_owned(), n as u64);
+    }
+    for (i, parting) in groom.parting.iter().enumerate() {
+        if !sites.partings.iter().any(|p| p.parting as usize == i) {
+            run.warnings.push(format!("parting {} has no length on the skin and does nothing", parting.name));
+        }
+    }
+    if c.partings.cut_short > 0 {
+        run.warnings.push(format!("{} partings stop at a gap or border of the skin", c.partings.cut_short));
     }
     if drawn.is_some() {
         let unit = run.project.shot.value.shot.meters_per_unit * 1e3;
@@ -192,12 +209,14 @@ fn comb_hairs(run: &mut Runner<'_>) -> Result<ControlHairs, Error> {
 }
 
 /// Region and main map of every operation.
-fn comb_maps(run: &Runner<'_>) -> Result<Vec<(Option<TiledMap>, Option<TiledMap>)>, Error> {
-    let read = |m: &Option<MapRef>, rgb: bool| -> Result<Option<TiledMap>, Error> {
-        m.as_ref().map(|m| super::skin::read_map(&run.project.maps[&m.map], m, rgb)).transpose()
-    };
-    let both = |c: &Comb| Ok((read(&c.region, false)?, read(&c.map, c.kind == Kind::DirectionMap)?));
-    run.project.groom.value.comb.iter().map(both).collect()
+fn comb_maps(run: &mut Runner<'_>) -> Result<Vec<(Option<TiledMap>, Option<TiledMap>)>, Error> {
+    let mut out = Vec::new();
+    for c in &run.project.groom.value.comb {
+        let texel = if c.kind == Kind::DirectionMap { Texel::Direction } else { Texel::Value };
+        let region = c.region.as_ref().map(|m| run.map(m, Texel::Value)).transpose()?;
+        out.push((region, c.map.as_ref().map(|m| run.map(m, texel)).transpose()?));
+    }
+    Ok(out)
 }
 
 fn operation<'a>(run: &Runner<'_>, c: &Comb, region: &'a Option<TiledMap>, map: &'a Option<TiledMap>) -> CombOp<'a> {

@@ -1,6 +1,7 @@
 //! Instance: roots, ids, weights and features of every hair, on the rest pose, once per groom. One cache entry a column.
 
 use super::run::{Counts, Runner};
+use super::skin::Texel;
 use super::tables::{decode, encode, id_columns, ids_of, root_columns, roots_of, table, vector_columns, vectors_of};
 use super::{Skin, What, candidate_density, groom, layer_seed};
 use crate::Error;
@@ -24,16 +25,23 @@ pub fn candidates(run: &mut Runner<'_>, i: usize) -> Result<Candidates, Error> {
     let layer = &run.project.groom.value.layer[i];
     let density = candidate_density(layer.density.value) * run.project.cm2_per_unit2();
     let count = (density * skin.area()).ceil() as usize;
-    if u32::try_from(count).is_err() {
-        let what = format!("layer {} asks for {count} candidate roots, more than 2^32", layer.name);
-        return Err(Error::input(what, "lower density.value, or check shot.meters_per_unit"));
-    }
+    check_count(run, i, count)?;
     let found = search(&skin, layer_seed(&layer.name), count);
     let file = encode("candidate roots in blue-noise order: a prefix is as even as the whole", &[
         table("candidate", root_columns(&found.root)),
     ]);
     run.keep(what, Counts::from([("candidates".to_owned(), found.root.len() as u64)]), &[("data.ply", &file)])?;
     Ok(found)
+}
+
+/// Ids number the candidates of a layer with 32 bits.
+fn check_count(run: &Runner<'_>, i: usize, count: usize) -> Result<(), Error> {
+    if u32::try_from(count).is_ok() {
+        return Ok(());
+    }
+    let what = format!("asks for {count} candidate roots on this skin, more than 2^32");
+    let help = "lower the density, or check shot.meters_per_unit";
+    Err(run.project.groom.error(&format!("layer[{i}].density.value"), what, help).into())
 }
 
 fn search(skin: &Skin, seed: u32, count: usize) -> Candidates {
@@ -50,7 +58,7 @@ pub fn roots(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
     let mut candidates = candidates(run, i)?;
     let layer = &run.project.groom.value.layer[i];
     let map = feature_map(run, &layer.density)?;
-    let on_off = layer.on_off.as_ref().map(|m| run.map(m)).transpose()?;
+    let on_off = layer.on_off.as_ref().map(|m| run.map(m, Texel::Value)).transpose()?;
     let density = Density {
         value: layer.density.value * run.project.cm2_per_unit2(),
         map: map.as_ref(),
@@ -59,6 +67,7 @@ pub fn roots(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
     let seed = layer_seed(&layer.name);
     let needed = density.needed_candidates(skin.area());
     if needed > candidates.root.len() {
+        check_count(run, i, needed)?;
         run.warnings.push(format!("layer {}: the density map exceeds 1; candidates beyond the cached ones", layer.name));
         candidates = search(&skin, seed, needed);
     }
@@ -131,9 +140,9 @@ fn decode_weights(bytes: &[u8]) -> Option<Weights> {
     Some(((0..t.rows).map(|i| [a[i], b[i], c[i]]).collect(), vectors_of(t, ["wa", "wb", "wc"])?))
 }
 
-fn feature_map(run: &Runner<'_>, f: &Feature) -> Result<Option<TiledMap>, Error> {
+fn feature_map(run: &mut Runner<'_>, f: &Feature) -> Result<Option<TiledMap>, Error> {
     let map = f.map.clone().map(|map| MapRef { map, channel: f.channel, wrap: f.wrap });
-    map.map(|m| run.map(&m)).transpose()
+    map.map(|m| run.map(&m, Texel::Value)).transpose()
 }
 
 /// A column of one number per hair: length in scene units, root diameter in micrometres, opacity.
@@ -173,7 +182,7 @@ pub fn color(run: &mut Runner<'_>, i: usize) -> Result<Vec<[f32; 3]>, Error> {
     let roots = roots(run, i)?;
     let color = &run.project.groom.value.layer[i].color;
     let map = color.map.clone().map(|map| MapRef { map, channel: Default::default(), wrap: color.wrap });
-    let map = map.map(|m| super::skin::read_map(&run.project.maps[&m.map], &m, true)).transpose()?;
+    let map = map.map(|m| run.map(&m, Texel::Color)).transpose()?;
     let value = color.value.map(|x| x as f32);
     let seed = u64::from(layer_seed(&run.project.groom.value.layer[i].name));
     let values = colour_column(&roots, value, map.as_ref(), color.noise as f32, rng::channel("color"), seed);

@@ -33,6 +33,11 @@ fn layer(run: &mut Runner<'_>, i: usize) -> Result<Rc<LayerHairs>, Error> {
     let length = instance::column(run, What::Length(i), i)?;
     let groom = &run.project.groom.value;
     let points = groom.layer[i].points.unwrap_or(groom.control.points);
+    if u32::try_from(root.len() * points).is_err() {
+        let what = format!("{} hairs of {points} points are more than 2^32 points", root.len());
+        let help = "lower the density or the points, or make two layers of it";
+        return Err(run.project.groom.error(&format!("layer[{i}].points"), what, help).into());
+    }
     let found = Rc::new(LayerHairs { points, root, hair, weight, length });
     run.layers.insert(i, found.clone());
     Ok(found)

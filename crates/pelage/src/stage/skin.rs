@@ -19,6 +19,8 @@ pub struct Skin {
     pub rest: Pose,
     /// What the file had odd.
     pub warnings: Vec<String>,
+    /// Polygons in its file.
+    faces: usize,
     bvh: OnceCell<Bvh>,
 }
 
@@ -40,6 +42,11 @@ impl Skin {
             return Err(Error::input(what, hint));
         }
         let topology = Topology::new(&mesh);
+        let area: f64 = topology.area.iter().sum();
+        if !(area.is_finite() && area > 0.0) {
+            let what = format!("{}: the skin's area is {area} square scene units", file.label);
+            return Err(Error::input(what, "hair needs a surface: check the scale of the mesh"));
+        }
         let rest = Pose::new(&mesh, &topology, mesh.position.clone());
         let c = topology.counts;
         let mut warnings: Vec<String> = read.warnings.iter().map(|w| format!("{}: {w}", file.label)).collect();
@@ -52,7 +59,7 @@ impl Skin {
                 warnings.push(format!("{}: {n} {what}", file.label));
             }
         }
-        Ok(Skin { mesh, topology, rest, warnings, bvh: OnceCell::new() })
+        Ok(Skin { mesh, topology, rest, warnings, faces: read.faces, bvh: OnceCell::new() })
     }
 
     /// Closest-point structure over the rest pose.
@@ -85,16 +92,32 @@ impl Skin {
         let position = match at {
             SkinAt::Rest => return Ok(self.rest.clone()),
             SkinAt::Rigid(t) => self.mesh.position.iter().map(|p| t.apply(Vec3::from(*p)).into()).collect(),
-            SkinAt::File(file) => ply::read_positions(&file.path, self.mesh.position.len())?,
+            SkinAt::File(file) => ply::read_frame(&file.path, self.mesh.position.len(), self.faces)?,
         };
         Ok(Pose::new(&self.mesh, &self.topology, position))
     }
 }
 
-/// Reads a map's tiles, one channel, or all three for a colour.
-pub fn read_map(tiles: &[(u32, InputFile)], m: &MapRef, rgb: bool) -> Result<TiledMap, Error> {
+/// What a map's texels are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Texel {
+    /// One linear value.
+    Value,
+    /// Three linear values: a direction.
+    Direction,
+    /// A colour: sRGB in integer formats.
+    Color,
+}
+
+/// Reads a map's tiles. Oddities go to `warnings`.
+pub fn read_map(
+    tiles: &[(u32, InputFile)],
+    m: &MapRef,
+    texel: Texel,
+    warnings: &mut Vec<String>,
+) -> Result<TiledMap, Error> {
     let channel = match m.channel {
-        _ if rgb => Channel::Rgb,
+        _ if texel != Texel::Value => Channel::Rgb,
         ConfigChannel::Grey => Channel::Auto,
         ConfigChannel::R => Channel::R,
         ConfigChannel::G => Channel::G,
@@ -105,6 +128,10 @@ pub fn read_map(tiles: &[(u32, InputFile)], m: &MapRef, rgb: bool) -> Result<Til
         WrapMode::Clamp => Wrap::Clamp,
         WrapMode::Repeat => Wrap::Repeat,
     };
-    let read = |(number, file): &(u32, InputFile)| Ok((*number, image::read_map(&file.path, channel, rgb)?.map));
-    Ok(TiledMap { tiles: tiles.iter().map(read).collect::<Result<_, Error>>()?, wrap })
+    let mut read = |(number, file): &(u32, InputFile)| {
+        let read = image::read_map(&file.path, channel, texel == Texel::Color)?;
+        warnings.extend(read.warnings.iter().map(|w| format!("{}: {w}", file.label)));
+        Ok((*number, read.map))
+    };
+    Ok(TiledMap { tiles: tiles.iter().map(&mut read).collect::<Result<_, Error>>()?, wrap })
 }

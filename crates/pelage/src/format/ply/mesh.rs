@@ -64,9 +64,9 @@ pub fn read_positions(path: &Path, expected_vertices: usize) -> Result<Vec<[f64;
     parse_positions(path, &read_bytes(path)?, expected_vertices, None)
 }
 
-/// [`read_positions`] for the rest pose `rest`: where the frame has faces, it must also have as many as that.
-pub fn read_frame(path: &Path, rest: &ReadMesh) -> Result<Vec<[f64; 3]>, FormatError> {
-    parse_positions(path, &read_bytes(path)?, rest.mesh.position.len(), Some(rest.faces))
+/// [`read_positions`] for a rest pose of so many vertices and faces: where the frame has faces, it must have as many.
+pub fn read_frame(path: &Path, vertices: usize, faces: usize) -> Result<Vec<[f64; 3]>, FormatError> {
+    parse_positions(path, &read_bytes(path)?, vertices, Some(faces))
 }
 
 fn parse_positions(
@@ -134,10 +134,18 @@ fn scalars(path: &Path, element: &ElementDef, names: &[&str]) -> Result<(), Form
     Ok(())
 }
 
-/// The values if all are finite, else an error that names the vertex and the property.
+/// Larger coordinates are broken ones: their squares do not fit single precision.
+const FARTHEST: f64 = 1e18;
+
+/// The values if all are finite and in bounds, else an error that names the vertex and the property.
 fn finite<const N: usize>(path: &Path, row: usize, names: &[&str; N], v: [f64; N]) -> Result<[f64; N], FormatError> {
-    match v.iter().position(|x| !x.is_finite()) {
+    match v.iter().position(|x| !x.is_finite() || x.abs() > FARTHEST) {
         None => Ok(v),
+        Some(k) if v[k].is_finite() => {
+            Err(FormatError::new(path, format!("{} is {:e}, at most {FARTHEST:e} is read", names[k], v[k]))
+                .at(format!("vertex {row}"))
+                .hint("check the scale of the mesh"))
+        }
         Some(k) => Err(FormatError::new(path, format!("{} is {}, not a finite number", names[k], v[k]))
             .at(format!("vertex {row}"))
             .hint("the program that wrote the file produced a broken position; repair the mesh there")),

@@ -398,6 +398,9 @@ fn clean_line(line: &str, declared: &mut Declared) -> Result<String, String> {
         Some("comment" | "obj_info") => return Ok(line.to_owned()),
         _ => return Ok(words.join(" ")),
     };
+    if slot == 1 && words[2].parse::<usize>().is_err() {
+        return Err(format!("element '{}' has no count: '{}' is not a whole number in range", words[1], words[2]));
+    }
     let raw = words[slot];
     let mut plain: String =
         raw.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' || c == '-' { c } else { '_' }).collect();

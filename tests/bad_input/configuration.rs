@@ -1,0 +1,215 @@
+//! Broken shot and groom files.
+
+use super::{Corpus, run_bounded};
+
+const SHOT: &str = "pipeline.toml";
+const GROOM: &str = "grooms/ball.toml";
+
+#[test]
+fn text_that_is_no_toml() {
+    let mut corpus = Corpus::new();
+    for file in [SHOT, GROOM] {
+        let name = file.rsplit('/').next().expect("a name");
+        let says = |words: &str| format!("{name}|{words}");
+        corpus.refuse("not UTF-8", file, b"[shot]\nname = \"\xff\"\n", &says("UTF-8|help:"));
+        corpus.refuse("garbage", file, super::noise(2000), &says("UTF-8|help:"));
+        corpus.refuse("empty", file, "", &says("missing field"));
+        let text = corpus.shot.read(file);
+        corpus.refuse("unterminated", file, [&text[..], b"\n[x\n"].concat(), &says("line"));
+        corpus.refuse("twice", file, [&text[..], &text[..]].concat(), &says("line|duplicate"));
+        corpus.refuse("half", file, &text[..text.len() / 2], &name.to_owned());
+        corpus.refuse("nested without end", file, format!("a = {}", "[".repeat(100_000)), &says("line 1"));
+        let path = corpus.shot.path().join(file);
+        std::fs::remove_file(&path).expect("the file was there");
+        corpus.refuse_as_it_is("no file", name);
+        std::fs::create_dir(&path).expect("a folder");
+        corpus.refuse_as_it_is("a folder", name);
+        std::fs::remove_dir(&path).expect("an empty folder");
+        corpus.shot.write(file, text);
+    }
+    corpus.refuse_edit(SHOT, "name = \"ball\"", "name = \"ball", "pipeline.toml, line 2");
+    corpus.refuse_edit(GROOM, "per_cm2 = 0.2 }", "per_cm2 = 0.2", "ball.toml, line 3|missing comma");
+    corpus.finish();
+}
+
+#[test]
+fn unknown_keys_at_every_level() {
+    let mut corpus = Corpus::new();
+    for (from, to, key) in [
+        ("[shot]", "[shoot]\n[shot]", "shoot|did you mean `shot`?"),
+        ("fps =", "fsp = 24\nfps =", "fsp|did you mean `fps`?"),
+        ("[export]", "mtion = 1\n[export]", "mtion"),
+        ("motion =", "moton = \"x\"\nmotion =", "moton|did you mean `motion`?"),
+        ("file =", "fil = 1\nfile =", "fil|did you mean `file`?"),
+        ("formats =", "format = 1\nformats =", "format|did you mean `formats`?"),
+        ("size =", "sizes = 1\nsize =", "sizes|did you mean `size`?"),
+        ("[preview]", "[cache]\nfolder = 1\n[preview]", "folder"),
+        ("\"usd\"", "\"usdc\"", "usdc|did you mean `usd`?"),
+        ("fps =", "up = \"x\"\nfps =", "unknown variant `x`"),
+    ] {
+        corpus.refuse_edit(SHOT, from, to, &format!("pipeline.toml, line|{key}"));
+    }
+    for (from, to, key) in [
+        ("[control]", "colour = 1\n[control]", "colour"),
+        ("points = 6", "point = 6", "point|did you mean `points`?"),
+        ("per_cm2", "per_cm", "per_cm|did you mean `per_cm2`?"),
+        ("bend =", "band = 1\nbend =", "band|did you mean `bend`?"),
+        ("direction-curve", "direction-curves", "did you mean `direction-curve`?"),
+        ("[[layer]]", "[[parting]]\nname = \"a\"\npoints = []\nside = \"left\"\n[[layer]]", "side"),
+        ("width =", "widht =", "did you mean `width`?"),
+        ("noise = 0.2", "nosie = 0.2", "did you mean `noise`?"),
+        ("tip = 0.5", "top = 0.5", "did you mean `tip`?"),
+        ("[0.4, 0.2, 0.1]", "[0.4, 0.2, 0.1], rgb = 1", "rgb"),
+        ("half.png\"", "half.png\", chanel = \"r\"", "did you mean `channel`?"),
+        ("half.png\"", "half.png\", channel = \"red\"", "unknown variant `red`"),
+        ("half.png\"", "half.png\", wrap = \"clamped\"", "did you mean `clamp`?"),
+        ("bend =", "region = { map = \"x\", size = 1 }\nbend =", "size"),
+    ] {
+        corpus.refuse_edit(GROOM, from, to, &format!("ball.toml, line|{key}"));
+    }
+    corpus.finish();
+}
+
+#[test]
+fn wrong_types_and_missing_tables() {
+    let mut corpus = Corpus::new();
+    for (from, to, words) in [
+        ("fps = 24", "fps = \"24\"", "line 4|expected f64"),
+        ("frames = [1, 2]", "frames = 2", "line 3"),
+        ("frames = [1, 2]", "frames = [1]", "line 3"),
+        ("frames = [1, 2]", "frames = [1, 2, 3]", "line 3"),
+        ("frames = [1, 2]", "frames = [1.5, 2]", "line 3"),
+        ("frames = [1, 2]", "frames = [1, 3000000000]", "line 3"),
+        ("name = \"ball\"", "name = 7", "line 2"),
+        ("\"grooms/ball.ply\"", "[\"grooms/ball.ply\"]", "line 8"),
+        ("size = [160, 120]", "size = [160, -120]", "line"),
+        ("[groom]\nfile = \"grooms/ball.toml\"\n", "", "groom"),
+        ("[groom]\nfile = \"grooms/ball.toml\"", "[groom]", "file"),
+        ("rest = \"grooms/ball.ply\"\n", "", "rest"),
+        ("fps = 24\n", "", "fps"),
+        ("meters_per_unit = 0.01\n", "", "meters_per_unit"),
+    ] {
+        corpus.refuse_edit(SHOT, from, to, &format!("pipeline.toml|{words}"));
+    }
+    for (from, to, words) in [
+        ("density = { value = 4.0", "density = { value = \"4\"", "line"),
+        ("density = { value = 1.0 }", "density = 1.0", "line"),
+        ("length = { value = 1.0, noise = 0.2 }\n", "", "length"),
+        ("name = \"under\"\n", "", "name"),
+        ("[0.4, 0.2, 0.1]", "[0.4, 0.2]", "line"),
+        ("[0.4, 0.2, 0.1]", "\"#ff0000\"", "line"),
+        ("points = 6", "points = 6.5", "line"),
+        ("points = 6", "points = -6", "line"),
+        ("placement = { per_cm2 = 0.2 }\n", "", "placement"),
+        ("kind = \"direction-curve\"\n", "", "kind"),
+        ("[0.0, 10.0, 0.0]", "[0.0, 10.0]", "line"),
+    ] {
+        corpus.refuse_edit(GROOM, from, to, &format!("ball.toml|{words}"));
+    }
+    let text = String::from_utf8(corpus.shot.read(GROOM)).expect("text");
+    let (control, _) = text.split_once("[[layer]]").expect("a layer");
+    corpus.refuse("no layer", GROOM, control, "ball.toml|layer");
+    corpus.refuse("an empty list of layers", GROOM, format!("layer = []\n{control}"), "ball.toml|no layer|help:");
+    corpus.finish();
+}
+
+#[test]
+fn values_out_of_range_in_the_shot() {
+    let mut corpus = Corpus::new();
+    for (from, to, words) in [
+        ("frames = [1, 2]", "frames = [2, 1]", "line 3|shot.frames|help:"),
+        ("frames = [1, 2]", "frames = [1, 2000000]", "line 3|shot.frames|million"),
+        ("frames = [1, 2]", "frames = [-2147483648, 2147483647]", "line 3|shot.frames|million"),
+        ("fps = 24", "fps = 0", "line 4|shot.fps|help:"),
+        ("fps = 24", "fps = -24", "line 4|shot.fps|help:"),
+        ("fps = 24", "fps = nan", "line 4|shot.fps|help:"),
+        ("meters_per_unit = 0.01", "meters_per_unit = inf", "line 5|shot.meters_per_unit|help:"),
+        ("meters_per_unit = 0.01", "meters_per_unit = 0", "line 5|shot.meters_per_unit|help:"),
+        ("name = \"ball\"", "name = \"\"", "line 2|shot.name|help:"),
+        ("name = \"ball\"", "name = \"../elsewhere\"", "line 2|shot.name|help:"),
+        ("name = \"ball\"", "name = \"..\"", "line 2|shot.name|help:"),
+        ("name = \"ball\"", "name = \"/tmp\"", "line 2|shot.name|help:"),
+        ("motion =", "frames = \"anim/a.####.ply\"\nmotion =", "skin.motion|skin.frames|help:"),
+        ("motion =", "pivot = [nan, 0, 0]\nmotion =", "skin.pivot"),
+        ("motion =", "motion_start = nan\nmotion =", "skin.motion_start"),
+        ("[\"usd\", \"mcap\"]", "[\"usd\", \"usd\"]", "export.formats|twice"),
+        ("size = [160, 120]", "size = [8, 8]", "preview.size"),
+        ("size = [160, 120]", "size = [100000, 100000]", "preview.size"),
+        ("sheet = 2", "sheet = 0", "preview.sheet"),
+        ("sheet = 2", "frame = 3", "preview.frame|help:"),
+        ("sheet = 2", "zoom = 0", "preview.zoom|help:"),
+        ("sheet = 2", "zoom = nan", "preview.zoom|help:"),
+        ("sheet = 2", "from = [0, 0, 0]", "preview.from|help:"),
+    ] {
+        corpus.refuse_edit(SHOT, from, to, &format!("pipeline.toml, line|{words}"));
+    }
+    corpus.finish();
+}
+
+#[test]
+fn values_out_of_range_in_the_groom() {
+    let mut corpus = Corpus::new();
+    for (from, to, words) in [
+        ("per_cm2 = 0.2", "per_cm2 = -1", "line 2|control.placement.per_cm2|help:"),
+        ("per_cm2 = 0.2", "per_cm2 = nan", "line 2|control.placement.per_cm2|help:"),
+        ("{ per_cm2 = 0.2 }", "{}", "line 2|control.placement|help:"),
+        ("per_cm2 = 0.2", "per_cm2 = 0.2, grid = [3, 3]", "line 2|control.placement|help:"),
+        ("per_cm2 = 0.2", "grid = [0, 3]", "line 2|control.placement.grid|help:"),
+        ("per_cm2 = 0.2", "grid = [100000, 100000]", "line 2|control.placement.grid|help:"),
+        ("points = 6", "points = 1", "line 3|control.points|help:"),
+        ("points = 6", "points = 100000", "line 3|control.points|help:"),
+        ("points = 6", "clearance = -1", "line 3|control.clearance|help:"),
+        ("points = 6", "length = { value = inf }", "line 3|control.length.value|help:"),
+        ("bend = 0.6", "bend = 1.6", "comb[0].bend|help:"),
+        ("bend = 0.6", "weight = -0.1", "comb[0].weight|help:"),
+        ("bend = 0.6", "radius = -1", "comb[0].radius|help:"),
+        ("bend = 0.6", "angle = 10", "comb[0].angle|not read|help:"),
+        ("bend = 0.6", "parting = \"middle\"", "comb[0]|parting|side|help:"),
+        ("bend = 0.6", "parting = \"middle\"\nside = \"left\"", "comb[0].parting|no parting `middle`|help:"),
+        ("[[0.0, 10.0, 0.0], ", "[", "comb[0].points"),
+        ("[0.0, 10.0, 0.0]", "[0.0, nan, 0.0]", "comb[0].points"),
+        ("direction-curve", "bend", "comb[0]"),
+        ("density = { value = 4.0", "density = { value = -4.0", "layer[0].density.value|help:"),
+        ("density = { value = 4.0", "density = { value = 1e9", "layer[0].density.value|help:"),
+        ("noise = 0.2", "noise = 1.2", "layer[0].length.noise|help:"),
+        ("length = { value = 1.0", "length = { value = nan", "layer[0].length.value|help:"),
+        ("tip = 0.5", "tip = -0.5", "layer[0].width.tip|help:"),
+        ("width = { value = 40.0", "width = { value = -40.0", "layer[0].width.value|help:"),
+        ("tip = 0.5 }", "tip = 0.5 }\nopacity = { value = 2 }", "layer[0].opacity.value|help:"),
+        ("[0.4, 0.2, 0.1]", "[0.4, -0.2, 0.1]", "layer[1].color.value[1]|help:"),
+        ("name = \"over\"", "name = \"under\"", "layer[1].name|twice|help:"),
+        ("name = \"over\"", "name = \"\"", "layer[1].name|help:"),
+        ("[[layer]]", "[[parting]]\nname = \"p\"\npoints = [[0, 0, 0]]\n[[layer]]", "parting[0].points"),
+    ] {
+        corpus.refuse_edit(GROOM, from, to, &format!("ball.toml, line|{words}"));
+    }
+    corpus.finish();
+}
+
+#[test]
+fn arguments_that_do_not_fit() {
+    let corpus = Corpus::new();
+    for (arguments, words) in [
+        (vec!["run", "--frames", "7"], vec!["frame 7", "help:"]),
+        (vec!["run", "--frames", "2-1"], vec!["2-1"]),
+        (vec!["run", "--to", "render"], vec!["render"]),
+        (vec!["run", "--jobs", "0"], vec!["0"]),
+        (vec!["run", "nowhere.toml"], vec!["nowhere.toml", "help:"]),
+        (vec!["plan", "nowhere.toml"], vec!["nowhere.toml", "help:"]),
+        (vec!["preview", "nowhere.toml"], vec!["nowhere.toml", "help:"]),
+        (vec!["inspect", "nowhere.ply"], vec!["nowhere.ply"]),
+        (vec!["inspect", "grooms"], vec!["grooms"]),
+        (vec!["compare", "out/ball/hair.usdc", "maps/half.png"], vec!["half.png"]),
+        (vec!["cache", "stats", "nowhere.toml"], vec!["nowhere.toml"]),
+        (vec!["init", "."], vec!["help:"]),
+        (vec!["comb"], vec!["comb"]),
+    ] {
+        let said = run_bounded(corpus.shot.path(), &arguments);
+        assert_eq!(said.code, Some(2), "{arguments:?}: {}", said.err);
+        assert_eq!(said.err.lines().filter(|l| l.starts_with("error: ")).count(), 1, "{arguments:?}: {}", said.err);
+        for word in words {
+            assert!(said.err.contains(word), "{arguments:?} does not say `{word}`: {}", said.err);
+        }
+    }
+    corpus.finish();
+}
