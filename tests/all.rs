@@ -4,5 +4,6 @@ mod bad_input;
 mod command_line;
 mod determinism;
 mod golden;
+mod reference;
 mod rows;
 mod samples;

@@ -78,7 +78,7 @@ pub fn around(skin: Vec<u8>, mesh: &Mesh, meters_per_unit: f64) -> Vec<NamedFile
     let density = two_digits((20_000.0 / cm2).clamp(0.001, 1e5));
     let control = two_digits((500.0 / cm2).clamp(1e-5, 1e4));
     let length = two_digits(0.03 * size);
-    let width = two_digits((0.0003 * size * meters_per_unit * 1e6).clamp(1.0, 1e6));
+    let width = two_digits((0.0006 * size * meters_per_unit * 1e6).clamp(1.0, 1e6));
     let fill = |template: &str| {
         let values = [("UNIT", meters_per_unit), ("DENSITY", density), ("CONTROL", control), ("LENGTH", length)];
         let filled = values.iter().fold(template.to_owned(), |t, (k, v)| t.replace(k, &v.to_string()));
