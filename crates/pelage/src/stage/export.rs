@@ -8,6 +8,7 @@ use crate::config::{ExportFormat, UpAxis};
 use crate::files::unfinished;
 use crate::format::{FormatError, HairFrame, HairLayer, ShotFacts, mcap::McapHair, ply, usd::UsdHair};
 use pelage_geom::Offsets;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -102,8 +103,8 @@ pub fn hair_layer(run: &mut Runner<'_>, i: usize) -> Result<HairLayer, Error> {
         offsets: Offsets::uniform(roots.id.len(), points),
         skin_face: roots.root.iter().map(|p| skin.mesh.face[p.triangle as usize] as i32).collect(),
         skin_bary: roots.root.iter().map(|p| p.bary).collect(),
-        id: roots.id,
-        root_uv: roots.uv,
+        id: roots.id.clone(),
+        root_uv: roots.uv.clone(),
         rest,
         width: width.iter().flat_map(|w| taper.iter().map(move |t| w * unit_per_micrometre * t)).collect(),
         color,
@@ -111,35 +112,40 @@ pub fn hair_layer(run: &mut Runner<'_>, i: usize) -> Result<HairLayer, Error> {
     })
 }
 
+fn hair_layers(run: &mut Runner<'_>) -> Result<Vec<HairLayer>, Error> {
+    (0..run.project.groom.value.layer.len()).map(|i| hair_layer(run, i)).collect()
+}
+
 /// Writes one format.
 pub fn write(run: &mut Runner<'_>, what: What, format: ExportFormat) -> Result<(), Error> {
     let out = run.project.out_dir();
     std::fs::create_dir_all(&out).map_err(Error::disk(&out))?;
     let facts = facts(run)?;
-    let count = run.project.groom.value.layer.len();
-    let layers = (0..count).map(|i| hair_layer(run, i)).collect::<Result<Vec<_>, _>>()?;
     let mut parts = Parts(Vec::new());
+    // Layers are read once to write and once to check: they need not lie beside the frames in memory.
     match format {
         ExportFormat::Usd => {
             let part = parts.add(&out, "hair.usdc".into());
-            let mut file = UsdHair::create(&part, &facts, &layers)?;
+            let mut file = UsdHair::create(&part, &facts, &hair_layers(run)?)?;
             frames(run, &facts, |frame, hair| Ok(file.write_frame(frame, hair)?))?;
             file.finish()?;
-            crate::format::usd::verify(&part, &facts, &layers)?;
+            crate::format::usd::verify(&part, &facts, &hair_layers(run)?)?;
         }
         ExportFormat::Mcap => {
             let part = parts.add(&out, "hair.mcap".into());
-            let mut file = McapHair::create(&part, &facts, &layers)?;
+            let mut file = McapHair::create(&part, &facts, &hair_layers(run)?)?;
             frames(run, &facts, |frame, hair| Ok(file.write_frame(frame, hair)?))?;
             file.finish()?;
-            crate::format::mcap::verify(&part, &facts, &layers)?;
+            crate::format::mcap::verify(&part, &facts, &hair_layers(run)?)?;
         }
-        ExportFormat::Ply => frames(run, &facts, |frame, hair| {
-            let part = parts.add(&out, format!("hair.{frame:04}.ply"));
-            ply::write_hair(&part, &facts, &layers, hair)?;
-            verify_ply(&part, &layers, hair)?;
-            Ok(())
-        })?,
+        ExportFormat::Ply => {
+            let layers = hair_layers(run)?;
+            frames(run, &facts, |frame, hair| {
+                let part = parts.add(&out, format!("hair.{frame:04}.ply"));
+                ply::write_hair(&part, &facts, &layers, hair)?;
+                verify_ply(&part, &layers, hair)
+            })?;
+        }
     }
     publish(run, what, std::mem::take(&mut parts.0))
 }
@@ -162,9 +168,9 @@ fn frames(
         if let Some(next) = &next {
             let rate = (facts.fps / f64::from(facts.frames[k + 1] - frame)) as f32;
             for (v, (a, b)) in velocity.iter_mut().zip(now.iter().zip(next)) {
-                for (v, (a, b)) in v.iter_mut().zip(a.iter().zip(b)) {
+                v.par_iter_mut().zip(a.par_iter().zip(b)).for_each(|(v, (a, b))| {
                     *v = std::array::from_fn(|x| (b[x] - a[x]) * rate);
-                }
+                });
             }
         }
         let hair: Vec<HairFrame<'_>> =

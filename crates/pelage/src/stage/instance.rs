@@ -12,6 +12,7 @@ use pelage_groom::candidates::{Candidates, candidates as find_candidates};
 use pelage_groom::instance::{Density, Feature as FeatureSource, Roots, colour_column, feature_column};
 use pelage_groom::instance::{roots as find_roots, weights as find_weights};
 use pelage_groom::triangulate::{mirrored_charts, triangulate};
+use std::rc::Rc;
 
 /// Blue-noise candidate roots of a layer.
 pub fn candidates(run: &mut Runner<'_>, i: usize) -> Result<Candidates, Error> {
@@ -49,11 +50,19 @@ fn search(skin: &Skin, seed: u32, count: usize) -> Candidates {
 }
 
 /// Roots of a layer's hairs: the candidates whose rank is below the local density.
-pub fn roots(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
-    let what = What::Roots(i);
-    if let Some(found) = run.fetch(what).and_then(|e| decode_roots(e.payload.first()?)) {
-        return Ok(found);
+pub fn roots(run: &mut Runner<'_>, i: usize) -> Result<Rc<Roots>, Error> {
+    if let Some(found) = run.roots.get(&i) {
+        return Ok(found.clone());
     }
+    let found = match run.fetch(What::Roots(i)).and_then(|e| decode_roots(e.payload.first()?)) {
+        Some(found) => Rc::new(found),
+        None => Rc::new(grow(run, i)?),
+    };
+    run.roots.insert(i, found.clone());
+    Ok(found)
+}
+
+fn grow(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
     let skin = groom::skin(run)?;
     let mut candidates = candidates(run, i)?;
     let layer = &run.project.groom.value.layer[i];
@@ -83,7 +92,7 @@ pub fn roots(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
         vec![("chart", Column::U32(found.chart.clone()))],
     ];
     let file = encode("hairs: id, root on the rest skin, texture coordinates, chart", &[table("hair", columns.concat())]);
-    run.keep(what, counts, &[("data.ply", &file)])?;
+    run.keep(What::Roots(i), counts, &[("data.ply", &file)])?;
     Ok(found)
 }
 

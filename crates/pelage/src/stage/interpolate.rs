@@ -5,7 +5,7 @@ use super::{What, groom, instance};
 use crate::Error;
 use crate::format::mcap;
 use crate::project::SkinAt;
-use pelage_geom::SurfacePoint;
+use pelage_groom::instance::Roots;
 use pelage_groom::interpolate::{Blend, interpolate, pose_controls, root_positions};
 use std::rc::Rc;
 
@@ -15,7 +15,7 @@ pub struct LayerHairs {
     /// Points of a hair.
     pub points: usize,
     /// Roots on the rest skin.
-    pub root: Vec<SurfacePoint>,
+    pub roots: Rc<Roots>,
     /// Control hairs.
     pub hair: Vec<[u32; 3]>,
     /// Their weights.
@@ -28,17 +28,17 @@ fn layer(run: &mut Runner<'_>, i: usize) -> Result<Rc<LayerHairs>, Error> {
     if let Some(found) = run.layers.get(&i) {
         return Ok(found.clone());
     }
-    let root = instance::roots(run, i)?.root;
+    let roots = instance::roots(run, i)?;
     let (hair, weight) = instance::weights(run, i)?;
     let length = instance::column(run, What::Length(i), i)?;
     let groom = &run.project.groom.value;
     let points = groom.layer[i].points.unwrap_or(groom.control.points);
-    if u32::try_from(root.len() * points).is_err() {
-        let what = format!("{} hairs of {points} points are more than 2^32 points", root.len());
+    if u32::try_from(roots.id.len() * points).is_err() {
+        let what = format!("{} hairs of {points} points are more than 2^32 points", roots.id.len());
         let help = "lower the density or the points, or make two layers of it";
         return Err(run.project.groom.error(&format!("layer[{i}].points"), what, help).into());
     }
-    let found = Rc::new(LayerHairs { points, root, hair, weight, length });
+    let found = Rc::new(LayerHairs { points, roots, hair, weight, length });
     run.layers.insert(i, found.clone());
     Ok(found)
 }
@@ -61,12 +61,12 @@ pub fn positions(run: &mut Runner<'_>, what: What) -> Result<Vec<[f32; 3]>, Erro
     let layer = layer(run, i)?;
     let pose = skin.pose(&at)?;
     let control = pose_controls(&control, &skin.mesh, &skin.topology, &pose, layer.points);
-    let root = root_positions(&skin.mesh, &pose, &layer.root, skin.origin());
+    let root = root_positions(&skin.mesh, &pose, &layer.roots.root, skin.origin());
     let blend = Blend { root: &root, hair: &layer.hair, weight: &layer.weight, length: &layer.length };
-    let mut out = vec![[0.0f32; 3]; layer.root.len() * layer.points];
+    let mut out = vec![[0.0f32; 3]; layer.roots.id.len() * layer.points];
     let found = interpolate(&blend, &control, &mut out);
     let counts = Counts::from([
-        ("hairs".to_owned(), layer.root.len() as u64),
+        ("hairs".to_owned(), layer.roots.id.len() as u64),
         ("points".to_owned(), out.len() as u64),
         ("hairs with cancelled directions".to_owned(), found.cancelled_hairs as u64),
     ]);

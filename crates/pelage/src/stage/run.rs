@@ -56,6 +56,7 @@ pub struct Runner<'a> {
     /// Warnings of the stage that runs.
     pub warnings: Vec<String>,
     pub(super) skin: Option<Rc<skin::Skin>>,
+    pub(super) roots: BTreeMap<usize, Rc<pelage_groom::instance::Roots>>,
     pub(super) layers: BTreeMap<usize, Rc<super::interpolate::LayerHairs>>,
     pub(super) placed: Option<pelage_groom::control::ControlHairs>,
     pub(super) control: Option<Rc<pelage_groom::control::ControlHairs>>,
@@ -86,6 +87,7 @@ impl<'a> Runner<'a> {
             store,
             warnings: Vec::new(),
             skin: None,
+            roots: BTreeMap::new(),
             layers: BTreeMap::new(),
             placed: None,
             control: None,
@@ -114,9 +116,9 @@ impl<'a> Runner<'a> {
         Ok(())
     }
 
-    /// Reads the maps that a feature names, one channel.
-    pub fn map(&self, m: &MapRef) -> Result<TiledMap, Error> {
-        skin::read_map(&self.project.maps[&m.map], m, false)
+    /// Reads a map that the groom names.
+    pub fn map(&mut self, m: &MapRef, texel: skin::Texel) -> Result<TiledMap, Error> {
+        skin::read_map(&self.project.maps[&m.map], m, texel, &mut self.warnings)
     }
 
     /// Content hash of an output file.
@@ -267,9 +269,7 @@ impl<'a> Runner<'a> {
         let (ran, found): (Vec<&Step>, Vec<&Step>) = todo.iter().partition(|s| self.ran.contains_key(&s.what));
         let found = found.into_iter().filter(|s| !waiting.contains(&s.what));
         (report.ran, report.reused) = tally(stage, &ran, &done.iter().chain(found).collect::<Vec<_>>());
-        for step in &steps {
-            self.add_counts(step, &mut report.counts);
-        }
+        report.counts = self.counts(&steps);
         report.warnings = std::mem::take(&mut self.warnings);
         report.warnings.extend(self.store.take_warnings());
         for warning in &report.warnings {
@@ -284,16 +284,22 @@ impl<'a> Runner<'a> {
         Ok(report)
     }
 
-    /// Adds the counts of a step of this or an earlier run. Frames are not summed: the largest frame counts.
-    fn add_counts(&self, step: &Step, counts: &mut Counts) {
-        let found = self.ran.get(&step.what).cloned().or_else(|| self.store.counts(&step.recipe.key()));
-        for (name, n) in found.unwrap_or_default() {
-            let at = counts.entry(name).or_default();
-            *at = match step.what {
-                What::Frame(..) | What::Rest(_) => (*at).max(n),
-                _ => *at + n,
-            };
+    /// Counts of steps, of this or an earlier run, summed over layers. Frames are not summed: the largest frame counts.
+    fn counts(&self, steps: &[Step]) -> Counts {
+        let mut moments: BTreeMap<Option<i32>, Counts> = BTreeMap::new();
+        for step in steps {
+            let moment = if let What::Frame(_, f) = step.what { Some(f) } else { None };
+            let found = self.ran.get(&step.what).cloned().or_else(|| self.store.counts(&step.recipe.key()));
+            for (name, n) in found.unwrap_or_default() {
+                *moments.entry(moment).or_default().entry(name).or_default() += n;
+            }
         }
+        let mut largest = Counts::new();
+        for (name, n) in moments.into_values().flatten() {
+            let at = largest.entry(name).or_default();
+            *at = n.max(*at);
+        }
+        largest
     }
 
     fn make(&mut self, what: What) -> Result<(), Error> {
