@@ -9,7 +9,7 @@ fn main() -> ExitCode {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
         Err(e) => {
-            eprintln!("{}", e.report());
+            pelage::progress::print_line(&e.report());
             ExitCode::from(e.exit_code())
         }
     }

@@ -1,7 +1,7 @@
 //! What a person sees while a command works: bars on a terminal, plain lines elsewhere. Everything goes to stderr.
 
 use indicatif::{ProgressBar, ProgressStyle};
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
 
 /// Progress of one stage at a time.
@@ -45,7 +45,7 @@ impl Progress {
             bar.set_message(what.to_owned());
         } else if !self.quiet && self.said.elapsed() > Duration::from_secs(2) {
             self.said = Instant::now();
-            eprintln!("{:<12} {}/{} {what}", self.stage, self.done, self.total);
+            print_line(&format!("{:<12} {}/{} {what}", self.stage, self.done, self.total));
         }
     }
 
@@ -63,7 +63,7 @@ impl Progress {
             bar.finish_and_clear();
         }
         if !self.quiet {
-            eprintln!("{:<12} {line} ({:.1} s)", self.stage, self.started.elapsed().as_secs_f64());
+            print_line(&format!("{:<12} {line} ({:.1} s)", self.stage, self.started.elapsed().as_secs_f64()));
         }
     }
 
@@ -72,7 +72,12 @@ impl Progress {
         match &self.bar {
             _ if self.quiet => {}
             Some(bar) => bar.println(line),
-            None => eprintln!("{line}"),
+            None => print_line(line),
         }
     }
+}
+
+/// A line on stderr; a reader that closed the pipe is no error.
+pub fn print_line(line: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "{line}");
 }

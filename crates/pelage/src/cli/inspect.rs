@@ -22,6 +22,7 @@ pub fn inspect(file: &Path, as_json: bool) -> Result<bool, Error> {
         s if s.starts_with(b"\x89PNG") || s.starts_with(b"II*\0") || s.starts_with(b"MM\0*") => inspect_image(file)?,
         s if s.starts_with(&[0x76, 0x2f, 0x31, 0x01]) => inspect_image(file)?,
         _ if extension == "csv" => inspect_motion(file)?,
+        _ if extension == "json" => inspect_record(file)?,
         _ => {
             let what = format!("{}: not a file that Pelage knows", file.display());
             return Err(Error::input(what, "it reads PLY, USD (.usdc), MCAP, .hair, PNG, TIFF, OpenEXR and motion CSV"));
@@ -194,6 +195,17 @@ fn inspect_image(file: &Path) -> Result<Value, Error> {
     let read = image::read_map(file, Channel::Auto, false)?;
     let values = spread(read.map.data.iter().map(|x| f64::from(*x)));
     Ok(json!({"kind": "map", "size": [width, height], "grey": values, "warnings": read.warnings}))
+}
+
+/// A record of the cache or a report: shown as it is.
+fn inspect_record(file: &Path) -> Result<Value, Error> {
+    let bytes = std::fs::read(file).map_err(Error::disk(file))?;
+    let found: Value = serde_json::from_slice(&bytes)
+        .map_err(|e| Error::input(format!("{}: not JSON: {e}", file.display()), "it may have been cut short"))?;
+    Ok(match found {
+        Value::Object(_) => json!({"kind": "record", "record": found}),
+        list => json!({"kind": "record", "item": list}),
+    })
 }
 
 fn inspect_motion(file: &Path) -> Result<Value, Error> {
