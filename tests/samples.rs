@@ -123,7 +123,7 @@ fn the_laws_of_the_coat_hold_on_the_bust() {
             assert!(w.iter().all(|x| *x >= 0.0) && (sum - 1.0).abs() <= 1e-6, "weights {w:?}");
         }
         let length = instance::column(&mut run, What::Length(i), i).unwrap_or_else(|e| panic!("{e}"));
-        let ids = instance::roots(&mut run, i).unwrap_or_else(|e| panic!("{e}")).id;
+        let ids = instance::roots(&mut run, i).unwrap_or_else(|e| panic!("{e}")).id.clone();
         assert!(ids.len() > 5000, "{} hairs", ids.len());
         for (frame, at) in &project.frames {
             let pose = skin.pose(at).unwrap_or_else(|e| panic!("{e}"));
