@@ -203,10 +203,11 @@ fn exported_hairs_are_exact(layer: &curves::CurveSet, length: &[f32], bvh: &Bvh,
     let s = &layer.strands;
     assert!(s.position.iter().flatten().all(|x| x.is_finite()) && layer.width.iter().all(|w| *w > 0.0));
     let (mut longest_error, mut farthest) = (0.0f64, 0.0f64);
-    for i in 0..s.len() {
+    assert_eq!(length.len(), s.len());
+    for (i, wanted) in length.iter().enumerate() {
         let points: Vec<Vec3> = s.points(i).iter().map(|p| point(*p, s.origin)).collect();
         let found: f64 = points.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
-        let wanted = f64::from(length[i]);
+        let wanted = f64::from(*wanted);
         longest_error = longest_error.max((found - wanted).abs() / wanted);
         let near = bvh.closest(points[0], f64::INFINITY).expect("a skin");
         farthest = farthest.max((near.position - points[0]).norm());

@@ -17,7 +17,7 @@ fn text_that_is_no_toml() {
         let text = corpus.shot.read(file);
         corpus.refuse("unterminated", file, [&text[..], b"\n[x\n"].concat(), &says("line"));
         corpus.refuse("twice", file, [&text[..], &text[..]].concat(), &says("line|duplicate"));
-        corpus.refuse("half", file, &text[..text.len() / 2], &name.to_owned());
+        corpus.refuse("half", file, &text[..text.len() / 2], name);
         corpus.refuse("nested without end", file, format!("a = {}", "[".repeat(100_000)), &says("line 1"));
         let path = corpus.shot.path().join(file);
         std::fs::remove_file(&path).expect("the file was there");
