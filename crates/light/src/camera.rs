@@ -99,6 +99,17 @@ impl Camera {
         }
     }
 
+    /// The same view about the same middle, `by` times as large: a longer lens from the same place.
+    pub fn zoomed(&self, by: f64) -> Camera {
+        let by = if by > 0.0 && by.is_finite() { by } else { 1.0 };
+        let half = libm::tan(0.5 * self.fov_y_deg.to_radians()) / by;
+        Camera {
+            fov_y_deg: 2.0 * libm::atan(half).to_degrees(),
+            parallel_height: self.parallel_height.map(|h| h / by),
+            ..*self
+        }
+    }
+
     /// The projection for a picture of `width` x `height` pixels. Nonsense (eye on target, up along the view, angle out
     /// of range) is replaced by something that can be drawn.
     pub fn view(&self, width: usize, height: usize) -> View {
@@ -182,6 +193,20 @@ mod tests {
                 reach = reach.max((x / 320.0 - 1.0).abs()).max((y / 240.0 - 1.0).abs());
             }
             assert!((reach - (1.0 - FRAME_MARGIN)).abs() < 1e-9, "{direction:?}: {reach}");
+        }
+    }
+
+    #[test]
+    fn zoom_scales_about_the_middle() {
+        let camera = Camera::frame(([-1.0; 3], [1.0; 3]), [0.3, -0.2, -1.0], [0.0, 1.0, 0.0], 1.5);
+        for camera in [camera, Camera { parallel_height: Some(3.0), ..camera }] {
+            let p = Vec3::new(0.5, -0.7, 0.2);
+            let at = |camera: Camera| camera.view(300, 200).project(p).expect("in front of the camera");
+            let (one, three) = (at(camera), at(camera.zoomed(3.0)));
+            for (i, middle) in [150.0, 100.0].into_iter().enumerate() {
+                assert!((three[i] - middle - 3.0 * (one[i] - middle)).abs() < 1e-9, "{one:?} {three:?}");
+            }
+            assert_eq!(camera.zoomed(f64::NAN), camera.zoomed(1.0));
         }
     }
 

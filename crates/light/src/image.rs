@@ -35,6 +35,22 @@ impl Image {
         bytes
     }
 
+    /// The picture at `1 / n` of its size: means of squares of `n` x `n` pixels; rows and columns left over are dropped.
+    pub fn shrunk(&self, n: usize) -> Image {
+        let n = n.max(1);
+        let (width, height) = (self.width / n, self.height / n);
+        let mut image = Image::filled(width, height, [0.0; 3]);
+        let share = 1.0 / (n * n) as f32;
+        for (k, out) in image.rgb.iter_mut().enumerate() {
+            for y in k / width * n..(k / width + 1) * n {
+                for c in &self.rgb[y * self.width + k % width * n..][..n] {
+                    *out = std::array::from_fn(|i| out[i] + share * c[i]);
+                }
+            }
+        }
+        image
+    }
+
     /// Writes a whole number into the lower left corner: light digits of 5 x 7 dots with a dark rim, each dot `scale`
     /// pixels wide. What does not fit is cut off.
     pub fn draw_number(&mut self, number: i64, scale: usize) {
@@ -159,6 +175,16 @@ mod tests {
         let rising: Vec<u8> = (0..100).map(|i| grey(i as f32 * 0.05)).collect();
         assert!(rising.windows(2).all(|w| w[0] <= w[1]) && rising[99] > 240);
         assert_eq!([grey(f32::INFINITY), grey(-1.0), grey(f32::NAN)], [255, 0, 0]);
+    }
+
+    #[test]
+    fn a_shrunk_picture_holds_the_means() {
+        let image = Image { width: 7, height: 5, rgb: (0..35).map(|k| [k as f32, 1.0, 0.0]).collect() };
+        let half = image.shrunk(2);
+        assert_eq!((half.width, half.height), (3, 2));
+        assert_eq!((half.rgb[0], half.rgb[5]), ([4.0, 1.0, 0.0], [22.0, 1.0, 0.0]));
+        assert_eq!((image.shrunk(1), image.shrunk(0)), (image.clone(), image.clone()));
+        assert_eq!(image.shrunk(9).rgb.len(), 0);
     }
 
     #[test]

@@ -10,6 +10,7 @@ pub mod image;
 pub mod preview;
 mod raster;
 pub mod shade;
+mod skin_map;
 mod slab;
 
 pub use camera::{Camera, View};

@@ -71,7 +71,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings { hair: HairShade::default(), ambient: [0.14, 0.15, 0.165], shadow: 0.9 }
+        Settings { hair: HairShade::default(), ambient: [0.18, 0.19, 0.21], shadow: 0.9 }
     }
 }
 
@@ -94,6 +94,9 @@ const SCATTER: f32 = 0.6;
 
 /// Part of the ambient light that reaches a place into which no light shines.
 const DEEP: f32 = 0.15;
+
+/// Cosine between view and triangle under which both of its sides count as the outer one: slivers on an outline.
+const EDGE_ON: f64 = 0.05;
 
 /// Linear colour of hair without a colour.
 const BROWN: [f32; 3] = [0.16, 0.085, 0.042];
@@ -206,9 +209,8 @@ impl Lighting {
         sum
     }
 
-    /// Colour of the skin at a point of camera space; `normal` is unit and may point away from the eye.
-    fn skin(&self, p: V3, normal: V3, color: V3) -> V3 {
-        let n = if normal.dot(&self.eye(p)) < 0.0 { -normal } else { normal };
+    /// Colour of the skin at a point of camera space with a unit normal on the side that is seen.
+    fn skin(&self, p: V3, n: V3, color: V3) -> V3 {
         let mut depth = Vec::with_capacity(self.columns());
         self.depths(p, n, &mut depth);
         let mut sum = V3::from(self.settings.ambient) * (self.ambient(&depth) * (0.75 + 0.25 * n.dot(&self.up)));
@@ -385,6 +387,17 @@ fn clip_near(corner: [Vec3; 3], near: f64) -> Vec<Vec3> {
     out
 }
 
+/// The unit normal of the side that `eye` (unit, away from the skin) sees. `face` is the normal of the flat triangle, on
+/// the side of `normal`: it says which side is seen, as a smooth normal near an outline may already point away. Such
+/// a normal is bent until it is at right angles to the view; turned round, it would light the outline from behind.
+fn seen_side(normal: Vec3, face: Vec3, eye: Vec3) -> Vec3 {
+    let normal = if face.dot(&eye) < -EDGE_ON { -normal } else { normal };
+    let away = normal.dot(&eye).min(0.0);
+    let bent = normal - eye * away;
+    let size = bent.norm();
+    if size > 1e-6 { bent / size } else { eye }
+}
+
 /// Colour of the skin where the ray through pixel position `at` meets `triangle` at `depth`.
 fn skin_color(scene: &Scene, view: &View, lighting: &Lighting, triangle: u32, at: [f64; 2], depth: f32) -> V3 {
     let Some(skin) = &scene.skin else { return V3::zeros() };
@@ -406,6 +419,9 @@ fn skin_color(scene: &Scene, view: &View, lighting: &Lighting, triangle: u32, at
         }
     }
     let size = normal.norm();
-    let normal = if size > 1e-9 && size.is_finite() { normal / size } else { face / area.sqrt() };
+    let face = face / area.sqrt();
+    let normal = if size > 1e-9 && size.is_finite() { normal / size } else { face };
+    let eye = lighting.eye(p.cast()).cast();
+    let normal = seen_side(normal, if face.dot(&normal) < 0.0 { -face } else { face }, eye);
     lighting.skin(p.cast(), normal.cast(), V3::from(skin.color))
 }

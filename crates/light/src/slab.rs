@@ -4,6 +4,7 @@
 //! volume in a preview, not enough to export.
 
 use crate::preview::{Scene, in_layer};
+use crate::skin_map::SkinMap;
 use crate::{V3, View};
 use pelage_geom::Vec3;
 use rayon::prelude::*;
@@ -12,34 +13,25 @@ use rayon::prelude::*;
 /// and begin to show single hairs as noise.
 const CELLS: usize = 128;
 
-/// Texels along each axis of the skin's depth map.
-const TEXELS: usize = 512;
-
 /// Cells that a point is lifted towards the light before it is looked up, so that hair does not shadow itself and the
 /// outermost layer stays lit. At 0 everything is dull, over 2 thin fur casts no shadow.
 const LIFT: f32 = 0.75;
-
-/// Texels by which skin must be nearer to the light to shadow a point, and over which that shadow sets in.
-const SKIN_BIAS: f32 = 2.5;
-
-/// Texels that a point of the skin is lifted along its normal: without, slopes along the light shadow themselves in
-/// rings.
-const SKIN_LIFT: f32 = 2.5;
 
 /// Parts that are summed apart and then together in this order: the same sum for any number of threads.
 const PARTS: usize = 4;
 
 /// Light-aligned box cut into cells: coordinates in cells from a low corner.
 #[derive(Clone, Copy, Debug)]
-struct Box3 {
+pub(crate) struct Box3 {
     axis: [Vec3; 3],
     low: [f64; 3],
-    per_unit: [f64; 3],
+    /// Cells per scene unit along each axis.
+    pub per_unit: [f64; 3],
 }
 
 impl Box3 {
     /// Bounds of points along `axis`, cut into `cells` each way; `None` without a finite point.
-    fn around(axis: [Vec3; 3], cells: usize, points: impl Iterator<Item = Vec3>) -> Option<Box3> {
+    pub fn around(axis: [Vec3; 3], cells: usize, points: impl Iterator<Item = Vec3>) -> Option<Box3> {
         let (mut lo, mut hi) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for p in points {
             let c = axis.map(|a| a.dot(&p));
@@ -61,12 +53,13 @@ impl Box3 {
         Some(Box3 { axis, low, per_unit: size.map(|s| cells as f64 / s) })
     }
 
-    fn place(&self, p: Vec3) -> [f64; 3] {
+    /// Coordinates of a point of scene space, in cells.
+    pub fn place(&self, p: Vec3) -> [f64; 3] {
         std::array::from_fn(|i| (self.axis[i].dot(&p) - self.low[i]) * self.per_unit[i])
     }
 
     /// The same coordinates from camera space.
-    fn seen_by(&self, view: &View) -> Affine {
+    pub fn seen_by(&self, view: &View) -> Affine {
         let origin = self.place(view.eye);
         Affine(std::array::from_fn(|i| {
             let a = view.turn(self.axis[i]) * self.per_unit[i];
@@ -80,12 +73,17 @@ pub(crate) const HUGE: f64 = 1e18;
 
 /// Camera space to cells.
 #[derive(Clone, Copy, Debug)]
-struct Affine([[f32; 4]; 3]);
+pub(crate) struct Affine([[f32; 4]; 3]);
 
 impl Affine {
     #[inline]
-    fn apply(&self, p: V3) -> [f32; 3] {
+    pub fn apply(&self, p: V3) -> [f32; 3] {
         self.0.map(|r| r[0] * p.x + r[1] * p.y + r[2] * p.z + r[3])
+    }
+
+    /// A direction.
+    pub fn turn(&self, d: V3) -> V3 {
+        self.0.map(|r| r[0] * d.x + r[1] * d.y + r[2] * d.z).into()
     }
 }
 
@@ -93,9 +91,7 @@ impl Affine {
 pub(crate) struct Slabs {
     /// Camera space to the hair's cells, and per column `CELLS + 1` sums of optical depth down from the light.
     hair: Option<(Affine, Vec<f32>)>,
-    /// Camera space to the skin's texels, the depth of the skin nearest to the light in texels, and their size in scene
-    /// units.
-    skin: Option<(Affine, Vec<f32>, f32)>,
+    skin: Option<SkinMap>,
 }
 
 impl Slabs {
@@ -107,12 +103,7 @@ impl Slabs {
         let axis = [x, z.cross(&x), z];
         let points = scene.layers.iter().flat_map(|l| l.position.iter().map(|p| in_layer(l, p)));
         let hair = Box3::around(axis, CELLS, points).map(|b| (b.seen_by(view), hair_grid(scene, &b)));
-        let skin = scene.skin.as_ref().and_then(|s| {
-            let mut b = Box3::around(axis, TEXELS, s.position.iter().map(|&p| Vec3::from(p)))?;
-            // Depth in texels too, so that one bias fits any skin.
-            b.per_unit[2] = b.per_unit[0].min(b.per_unit[1]);
-            Some((b.seen_by(view), skin_map(s, &b), (1.0 / b.per_unit[2]) as f32))
-        });
+        let skin = scene.skin.as_ref().and_then(|s| SkinMap::new(s, axis, view));
         Slabs { hair, skin }
     }
 
@@ -140,18 +131,7 @@ impl Slabs {
     /// Part of the light that no skin is in the way of, in [0, 1]. `normal` is the unit normal of the skin if the point is
     /// on it, else zero.
     pub fn skin_light(&self, p: V3, normal: V3) -> f32 {
-        let Some((affine, depth, texel)) = &self.skin else { return 1.0 };
-        let [x, y, z] = affine.apply(p + normal * (SKIN_LIFT * texel));
-        let n = TEXELS as f32;
-        if !(x > 0.0 && y > 0.0 && x < n && y < n) {
-            return 1.0;
-        }
-        let (x, y) = ((x - 0.5).clamp(0.0, n - 1.001), (y - 0.5).clamp(0.0, n - 1.001));
-        let ((i, fx), (j, fy)) = (split(x), split(y));
-        let lit = |i: usize, j: usize| 1.0 - ((z - depth[j * TEXELS + i]) / SKIN_BIAS - 1.0).clamp(0.0, 1.0);
-        let low = lit(i, j) * (1.0 - fx) + lit(i + 1, j) * fx;
-        let high = lit(i, j + 1) * (1.0 - fx) + lit(i + 1, j + 1) * fx;
-        low * (1.0 - fy) + high * fy
+        self.skin.as_ref().map_or(1.0, |map| map.light(p, normal))
     }
 }
 
@@ -226,37 +206,6 @@ fn blur(sum: &[f32], stride: usize) -> Vec<f32> {
         }
     });
     out
-}
-
-/// Depth of the skin nearest to the light at texel centres, in texels; infinite where there is none.
-fn skin_map(skin: &crate::SkinView, texels: &Box3) -> Vec<f32> {
-    let mut depth = vec![f32::INFINITY; TEXELS * TEXELS];
-    for t in skin.triangle {
-        let Some(corner) = skin.corners(t) else { continue };
-        let c = corner.map(|p| texels.place(p));
-        let cross =
-            |a: [f64; 3], b: [f64; 3], p: [f64; 2]| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
-        let area = cross(c[0], c[1], [c[2][0], c[2][1]]);
-        if area == 0.0 || !area.is_finite() {
-            continue;
-        }
-        let span = |i: usize| {
-            let lo = (c[0][i].min(c[1][i]).min(c[2][i]) - 0.5).ceil().max(0.0);
-            let hi = (c[0][i].max(c[1][i]).max(c[2][i]) - 0.5).floor().min(TEXELS as f64 - 1.0);
-            lo as usize..(hi + 1.0).max(lo) as usize
-        };
-        for j in span(1) {
-            for i in span(0) {
-                let p = [i as f64 + 0.5, j as f64 + 0.5];
-                let w = [cross(c[1], c[2], p) / area, cross(c[2], c[0], p) / area, cross(c[0], c[1], p) / area];
-                if w.iter().all(|&w| w >= -1e-9) {
-                    let d = &mut depth[j * TEXELS + i];
-                    *d = d.min((w[0] * c[0][2] + w[1] * c[1][2] + w[2] * c[2][2]) as f32);
-                }
-            }
-        }
-    }
-    depth
 }
 
 #[cfg(test)]

@@ -72,7 +72,7 @@ mod version {
     pub const COLUMN: u32 = 1;
     pub const INTERPOLATE: u32 = 1;
     pub const EXPORT: u32 = 1;
-    pub const PREVIEW: u32 = 1;
+    pub const PREVIEW: u32 = 2;
 }
 
 /// Candidates are made for the next power of two of the density, hairs per square centimetre, so that tweaking a

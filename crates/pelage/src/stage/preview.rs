@@ -12,6 +12,10 @@ use pelage_light::{Camera, HairView, Image, Scene, Settings, SkinView, contact_s
 const BACKGROUND: [f32; 3] = [0.16, 0.17, 0.19];
 /// Linear colour of skin, a neutral warm clay.
 const SKIN: [f32; 3] = [0.42, 0.31, 0.26];
+/// Hairs of a layer that the camera is placed by: all, or as many evenly over them. The margin holds the others.
+const FRAMED: usize = 20_000;
+/// Pictures of a contact sheet are drawn this many times as large and scaled down: hairs are thin there.
+const FINER: u32 = 2;
 
 /// Draws the still.
 pub fn still(run: &mut Runner<'_>) -> Result<(), Error> {
@@ -30,8 +34,8 @@ pub fn sheet(run: &mut Runner<'_>) -> Result<(), Error> {
     let size = run.project.shot.value.preview.size.map(|x| (x / 3).max(16));
     let mut pictures = Vec::new();
     for frame in &frames {
-        let mut picture = draw(run, &layers, &camera, *frame, size)?;
-        picture.draw_number(i64::from(*frame), 2);
+        let mut picture = draw(run, &layers, &camera, *frame, size.map(|x| x * FINER))?.shrunk(FINER as usize);
+        picture.draw_number(i64::from(*frame), (picture.width / 160).max(1));
         pictures.push(picture);
     }
     let columns = (1..=frames.len()).find(|c| c * c >= frames.len()).unwrap_or(1);
@@ -42,31 +46,26 @@ fn layers(run: &mut Runner<'_>) -> Result<Vec<HairLayer>, Error> {
     (0..run.project.groom.value.layer.len()).map(|i| export::hair_layer(run, i)).collect()
 }
 
-/// A camera that sees skin and hair at all of the frames.
+/// A camera that sees skin and hair at all of the frames, as near as it can.
 fn camera(run: &mut Runner<'_>, layers: &[HairLayer], frames: &[i32]) -> Result<Camera, Error> {
     let skin = groom::skin(run)?;
     let origin = skin.origin();
-    let mut low = [f64::INFINITY; 3];
-    let mut high = [f64::NEG_INFINITY; 3];
-    let mut add = |p: [f64; 3]| {
-        for x in 0..3 {
-            (low[x], high[x]) = (low[x].min(p[x]), high[x].max(p[x]));
-        }
-    };
+    let mut points = Vec::new();
     for frame in frames {
-        skin.pose(&run.project.frames[frame])?.position.iter().for_each(|p| add(*p));
-        for i in 0..layers.len() {
+        points.extend_from_slice(&skin.pose(&run.project.frames[frame])?.position);
+        for (i, layer) in layers.iter().enumerate() {
             let position = interpolate::positions(run, What::Frame(i, *frame))?;
-            position.iter().for_each(|p| add(std::array::from_fn(|x| f64::from(p[x]) + origin[x])));
+            let hairs = layer.offsets.len();
+            for hair in (0..hairs).step_by(hairs.div_ceil(FRAMED).max(1)) {
+                let hair = &position[layer.offsets.range(hair)];
+                points.extend(hair.iter().map(|p| std::array::from_fn::<f64, 3, _>(|x| f64::from(p[x]) + origin[x])));
+            }
         }
     }
     let shot = &run.project.shot.value;
     let up = if shot.shot.up == UpAxis::Y { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] };
     let aspect = f64::from(shot.preview.size[0]) / f64::from(shot.preview.size[1]);
-    // Zooming in frames a smaller box about the same middle.
-    let half = 0.5 / shot.preview.zoom;
-    let shrunk = |sign: f64| std::array::from_fn(|x| 0.5 * (low[x] + high[x]) + sign * half * (high[x] - low[x]));
-    Ok(Camera::frame((shrunk(-1.0), shrunk(1.0)), shot.preview.from.map(|x| -x), up, aspect))
+    Ok(Camera::frame_points(points, shot.preview.from.map(|x| -x), up, aspect).zoomed(shot.preview.zoom))
 }
 
 fn draw(
@@ -96,12 +95,8 @@ fn draw(
         })
         .collect();
     let lights = studio_lights(camera);
-    let surface = SkinView {
-        position: &pose.position,
-        triangle: &skin.mesh.triangle,
-        normal: &pose.normal,
-        color: SKIN,
-    };
+    let surface =
+        SkinView { position: &pose.position, triangle: &skin.mesh.triangle, normal: &pose.normal, color: SKIN };
     let scene = Scene { skin: Some(surface), layers: &views, lights: &lights, background: BACKGROUND };
     Ok(render(&scene, camera, size[0] as usize, size[1] as usize, &Settings::default()).0)
 }
