@@ -112,8 +112,12 @@ pub fn hair_layer(run: &mut Runner<'_>, i: usize) -> Result<HairLayer, Error> {
     })
 }
 
+/// All layers. What was read to make them is dropped: frames need the memory.
 fn hair_layers(run: &mut Runner<'_>) -> Result<Vec<HairLayer>, Error> {
-    (0..run.project.groom.value.layer.len()).map(|i| hair_layer(run, i)).collect()
+    let layers = (0..run.project.groom.value.layer.len()).map(|i| hair_layer(run, i)).collect();
+    run.roots.clear();
+    run.layers.clear();
+    layers
 }
 
 /// Writes one format.
