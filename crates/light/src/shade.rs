@@ -19,7 +19,7 @@ pub fn studio_lights(camera: &Camera) -> Vec<Light> {
         |x: f64, y: f64, z: f64, color| Light { direction: (axis[0] * x + axis[1] * y + axis[2] * z).into(), color };
     vec![
         light(0.55, 0.75, 0.75, [1.30, 1.22, 1.12]),
-        light(-0.8, 0.1, 0.75, [0.26, 0.30, 0.38]),
+        light(-0.8, 0.1, 0.75, [0.30, 0.32, 0.37]),
         light(-0.55, 0.75, -0.8, [0.80, 0.85, 0.94]),
     ]
 }
@@ -54,7 +54,7 @@ impl Default for HairShade {
     fn default() -> Self {
         HairShade {
             diffuse: 0.66,
-            specular: 0.19,
+            specular: 0.13,
             exponent: 60,
             shift_deg: 7.0,
             glint: 0.6,
