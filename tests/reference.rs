@@ -84,7 +84,9 @@ fn reference() -> String {
         "# Reference\nEvery key of the two files that a person writes. Unknown keys are refused. Paths are relative to the \
          file that\nnames them. `[]` marks lists of tables, written `[[layer]]`. What the values do: `docs/stages.md`.\n",
     );
-    for (title, text) in [("`pipeline.toml`: a shot", schema::<ShotFile>()), ("`grooms/*.toml`: a groom", schema::<GroomFile>())] {
+    for (title, text) in
+        [("`pipeline.toml`: a shot", schema::<ShotFile>()), ("`grooms/*.toml`: a groom", schema::<GroomFile>())]
+    {
         let root: Value = serde_json::from_str(&text).expect("a schema is JSON");
         writeln!(out, "\n## {title}\n\n{}", root["description"].as_str().unwrap_or("")).expect("text");
         section(&root, &root, "", &mut out);
@@ -107,6 +109,9 @@ fn the_reference_says_what_the_structs_say() {
             std::fs::write(&path, &text).expect("a file");
         }
         let found = std::fs::read_to_string(&path).unwrap_or_default();
-        assert!(found == text, "docs/{name} is out of date: PELAGE_UPDATE_GOLDEN=1 cargo test -p pelage-tests reference");
+        assert!(
+            found == text,
+            "docs/{name} is out of date: PELAGE_UPDATE_GOLDEN=1 cargo test -p pelage-tests reference"
+        );
     }
 }

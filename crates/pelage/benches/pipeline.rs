@@ -44,7 +44,10 @@ fn make_shot(dir: &Path) {
         write(&format!("{name}.png"), &wave(k + 1, 1));
     }
     write("color.png", &wave(5, 3));
-    write("turn.csv", b"time_s,tx,ty,tz,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,0.1,0,0,0,0.7071067811865476,0,0.7071067811865476\n");
+    write(
+        "turn.csv",
+        b"time_s,tx,ty,tz,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,0.1,0,0,0,0.7071067811865476,0,0.7071067811865476\n",
+    );
     write(
         "pipeline.toml",
         br#"[shot]
@@ -82,7 +85,11 @@ color = { value = [1.0, 1.0, 1.0], map = "color.png" }
 
 /// Runs the command and returns its report.
 fn run(dir: &Path, arguments: &[&str]) -> serde_json::Value {
-    let command = Command::new(env!("CARGO_BIN_EXE_pelage")).args(["run", "--json", "--quiet"]).args(arguments).current_dir(dir).output();
+    let command = Command::new(env!("CARGO_BIN_EXE_pelage"))
+        .args(["run", "--json", "--quiet"])
+        .args(arguments)
+        .current_dir(dir)
+        .output();
     let out = command.expect("the command starts");
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     serde_json::from_slice(&out.stdout).expect("a report")
@@ -105,6 +112,10 @@ fn plain_write(dir: &Path) {
         file.write_all(&bytes).expect("room on the disk");
         file.sync_all().expect("the disk");
         let seconds = start.elapsed().as_secs_f64();
-        println!("{:<36} {seconds:>8.3} s   {:>6.0} MB/s", format!("plain write of {name}"), bytes.len() as f64 / 1e6 / seconds);
+        println!(
+            "{:<36} {seconds:>8.3} s   {:>6.0} MB/s",
+            format!("plain write of {name}"),
+            bytes.len() as f64 / 1e6 / seconds
+        );
     }
 }

@@ -76,9 +76,9 @@ impl Project {
         let drawn = drawn.map(|p| find.file(&groom, "control.placement.curves", p)).transpose()?;
         let mut maps = BTreeMap::new();
         for (key, path) in named_maps(&groom.value) {
-            if !maps.contains_key(&path) {
-                let tiles = find.map(&groom, &key, &path)?;
-                maps.insert(path, tiles);
+            if let std::collections::btree_map::Entry::Vacant(place) = maps.entry(path) {
+                let tiles = find.map(&groom, &key, place.key())?;
+                place.insert(tiles);
             }
         }
         hashes.save();

@@ -40,7 +40,10 @@ pub fn compare(a: &Path, b: &Path, tolerance: f64, json: bool) -> Result<bool, E
     let shared: Vec<f64> = first_a.frames.iter().filter(|f| first_b.frames.contains(f)).copied().collect();
     let timed = !first_a.frames.is_empty() && !first_b.frames.is_empty();
     if timed && shared.is_empty() {
-        return Err(Error::input("the two files have no frame in common", "`pelage inspect` lists the frames of a file"));
+        return Err(Error::input(
+            "the two files have no frame in common",
+            "`pelage inspect` lists the frames of a file",
+        ));
     }
     let mut layers: BTreeMap<String, LayerDifference> = BTreeMap::new();
     let moments: Vec<Option<f64>> = if timed { shared.iter().map(|f| Some(*f)).collect() } else { vec![None] };
@@ -53,7 +56,11 @@ pub fn compare(a: &Path, b: &Path, tolerance: f64, json: bool) -> Result<bool, E
             let entry = layers.entry(la.name.clone()).or_default();
             add(entry, la, lb.unwrap_or(&empty), *frame);
         }
-        for lb in fb.layers.iter().filter(|l| !l.name.is_empty() && !fa.layers.iter().any(|m| m.name == l.name || m.name.is_empty())) {
+        for lb in fb
+            .layers
+            .iter()
+            .filter(|l| !l.name.is_empty() && !fa.layers.iter().any(|m| m.name == l.name || m.name.is_empty()))
+        {
             let entry = layers.entry(lb.name.clone()).or_default();
             let empty = CurveSet { name: lb.name.clone(), strands: Default::default(), width: Vec::new() };
             add(entry, &empty, lb, *frame);
@@ -65,7 +72,8 @@ pub fn compare(a: &Path, b: &Path, tolerance: f64, json: bool) -> Result<bool, E
     let close = |l: &LayerDifference| l.only_in == [0, 0] && l.other_point_count == 0 && l.max_distance <= tolerance;
     let equal = same_frames && layers.iter().all(close);
     if json {
-        let report = serde_json::json!({"equal": equal, "frames": frames, "compared_frames": moments.len(), "layers": layers});
+        let report =
+            serde_json::json!({"equal": equal, "frames": frames, "compared_frames": moments.len(), "layers": layers});
         print(&(serde_json::to_string_pretty(&report).expect("plain JSON") + "\n"));
     } else {
         let mut out: String = layers.iter().map(describe).collect();

@@ -20,12 +20,15 @@ pub fn inspect(file: &Path, as_json: bool) -> Result<bool, Error> {
             describe_curves(&curves::read(file, None)?)
         }
         s if s.starts_with(b"\x89PNG") || s.starts_with(b"II*\0") || s.starts_with(b"MM\0*") => inspect_image(file)?,
-        s if s.starts_with(&[0x76, 0x2f, 0x31, 0x01]) => inspect_image(file)?,
+        [0x76, 0x2f, 0x31, 0x01, ..] => inspect_image(file)?,
         _ if extension == "csv" => inspect_motion(file)?,
         _ if extension == "json" => inspect_record(file)?,
         _ => {
             let what = format!("{}: not a file that Pelage knows", file.display());
-            return Err(Error::input(what, "it reads PLY, USD (.usdc), MCAP, .hair, PNG, TIFF, OpenEXR and motion CSV"));
+            return Err(Error::input(
+                what,
+                "it reads PLY, USD (.usdc), MCAP, .hair, PNG, TIFF, OpenEXR and motion CSV",
+            ));
         }
     };
     if as_json {

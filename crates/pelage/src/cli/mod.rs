@@ -170,7 +170,9 @@ fn parse_frames(text: &str) -> Result<Frames, String> {
 /// Does what the arguments say; true if the exit code is 0.
 pub fn execute(arguments: Arguments) -> Result<bool, Error> {
     match arguments.command {
-        Command::Init { dir, skin, meters_per_unit, sample } => init::init(&dir, skin.as_deref(), meters_per_unit, sample),
+        Command::Init { dir, skin, meters_per_unit, sample } => {
+            init::init(&dir, skin.as_deref(), meters_per_unit, sample)
+        }
         Command::Run(a) => run::run(a, false),
         Command::Preview(a) => run::run(a, true),
         Command::Plan(a) => run::plan(a),

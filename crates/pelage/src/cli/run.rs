@@ -10,7 +10,13 @@ use crate::stage::{Options, PlannedStage, Runner, Stage};
 use std::io::Write;
 
 fn options(a: &RunArguments, sheet: bool) -> Options {
-    Options { to: a.to, frames: a.frames.as_ref().map(|f| f.0.clone()), force: a.force, without: sheet.then_some(Stage::Export), sheet }
+    Options {
+        to: a.to,
+        frames: a.frames.as_ref().map(|f| f.0.clone()),
+        force: a.force,
+        without: sheet.then_some(Stage::Export),
+        sheet,
+    }
 }
 
 /// Sets the number of threads. Results do not depend on it.

@@ -14,7 +14,7 @@ pub struct ConfigError {
     pub what: String,
     /// What the user can do; empty if there is nothing to add.
     pub help: String,
-    source: NamedSource<String>,
+    source: Box<NamedSource<String>>,
     span: Option<SourceSpan>,
 }
 
@@ -35,7 +35,7 @@ impl Diagnostic for ConfigError {
     }
 
     fn source_code(&self) -> Option<&dyn miette::SourceCode> {
-        self.span.map(|_| &self.source as &dyn miette::SourceCode)
+        self.span.map(|_| &*self.source as &dyn miette::SourceCode)
     }
 
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
@@ -111,7 +111,7 @@ impl<T: DeserializeOwned> Document<T> {
                 what: first_line(e.message()),
                 help: suggestion(e.message()).unwrap_or_default(),
                 span: e.span().map(SourceSpan::from),
-                source: NamedSource::new(path.display().to_string(), text),
+                source: Box::new(NamedSource::new(path.display().to_string(), text)),
             }),
         }
     }
@@ -126,7 +126,7 @@ impl<T> Document<T> {
             what: format!("{key}: {}", what.into()),
             help: help.into(),
             span: span_of(&self.text, key),
-            source: NamedSource::new(self.path.display().to_string(), self.text.clone()),
+            source: Box::new(NamedSource::new(self.path.display().to_string(), self.text.clone())),
         }
     }
 
@@ -156,7 +156,7 @@ fn tidy(path: &Path) -> PathBuf {
 }
 
 fn plain(path: &Path, what: String, help: String) -> ConfigError {
-    let source = NamedSource::new(path.display().to_string(), String::new());
+    let source = Box::new(NamedSource::new(path.display().to_string(), String::new()));
     ConfigError { path: path.to_path_buf(), what, help, source, span: None }
 }
 

@@ -343,7 +343,10 @@ impl Document<GroomFile> {
         }
         for (i, l) in self.value.layer.iter().enumerate() {
             let key = format!("layer[{i}]");
-            if l.name.is_empty() || l.name.chars().any(char::is_control) || self.value.layer[..i].iter().any(|m| m.name == l.name) {
+            if l.name.is_empty()
+                || l.name.chars().any(char::is_control)
+                || self.value.layer[..i].iter().any(|m| m.name == l.name)
+            {
                 return Err(self.error(
                     &format!("{key}.name"),
                     "is empty, used twice or not one line of text",

@@ -166,17 +166,17 @@ impl Document<ShotFile> {
             return bad("shot.fps", "must be between 0.000001 and 1000000", "24 is film");
         }
         if !(1e-9..=1e9).contains(&s.shot.meters_per_unit) {
-            return bad(
-                "shot.meters_per_unit",
-                "must be between 1e-9 and 1e9",
-                "1 for metres, 0.01 for centimetres",
-            );
+            return bad("shot.meters_per_unit", "must be between 1e-9 and 1e9", "1 for metres, 0.01 for centimetres");
         }
         if s.skin.motion.is_some() && s.skin.frames.is_some() {
             return bad("skin.motion", "can't go together with skin.frames", "keep one of the two");
         }
         if s.skin.motion_start.is_some_and(|x| !x.is_finite()) {
-            return bad("skin.motion_start", "must be a finite number", "it is the frame at which the motion's time is 0");
+            return bad(
+                "skin.motion_start",
+                "must be a finite number",
+                "it is the frame at which the motion's time is 0",
+            );
         }
         if s.skin.frames.as_ref().is_some_and(|f| f.to_string_lossy().matches('#').count() == 0) {
             return bad("skin.frames", "has no # for the frame number", "write for example \"anim/bust.####.ply\"");

@@ -40,20 +40,33 @@ pub fn placed(run: &mut Runner<'_>) -> Result<Sites, Error> {
         return Ok(sites);
     }
     let (hairs, sites, counts) = place_hairs(run)?;
-    let file = encode("sites of control hairs: chart, u, v, left and right hair; borders; partings", &[
-        table("site", [
-            vec![("chart", ply::Column::U32(sites.chart.clone()))],
-            vector_columns(["u", "v"], &sites.uv),
-            pair_columns(["left", "right"], &sites.hair),
-        ].concat()),
-        table("border", pair_columns(["a", "b"], &sites.border_edges)),
-        table("piece", vec![
-            ("parting", ply::Column::U32(sites.partings.iter().map(|p| p.parting).collect())),
-            ("chart", ply::Column::U32(sites.partings.iter().map(|p| p.chart).collect())),
-            ("count", ply::Column::U32(sites.partings.iter().map(|p| p.site.len() as u32).collect())),
-        ]),
-        table("piece_site", vec![("site", ply::Column::U32(sites.partings.iter().flat_map(|p| p.site.clone()).collect()))]),
-    ]);
+    let file = encode(
+        "sites of control hairs: chart, u, v, left and right hair; borders; partings",
+        &[
+            table(
+                "site",
+                [
+                    vec![("chart", ply::Column::U32(sites.chart.clone()))],
+                    vector_columns(["u", "v"], &sites.uv),
+                    pair_columns(["left", "right"], &sites.hair),
+                ]
+                .concat(),
+            ),
+            table("border", pair_columns(["a", "b"], &sites.border_edges)),
+            table(
+                "piece",
+                vec![
+                    ("parting", ply::Column::U32(sites.partings.iter().map(|p| p.parting).collect())),
+                    ("chart", ply::Column::U32(sites.partings.iter().map(|p| p.chart).collect())),
+                    ("count", ply::Column::U32(sites.partings.iter().map(|p| p.site.len() as u32).collect())),
+                ],
+            ),
+            table(
+                "piece_site",
+                vec![("site", ply::Column::U32(sites.partings.iter().flat_map(|p| p.site.clone()).collect()))],
+            ),
+        ],
+    );
     run.keep(What::Place, counts, &[("data.ply", &file)])?;
     run.placed = Some(hairs);
     Ok(sites)
@@ -104,11 +117,14 @@ fn place_hairs(run: &mut Runner<'_>) -> Result<(ControlHairs, Sites, Counts), Er
                 let help = "lower it, or check shot.meters_per_unit";
                 return Err(run.project.groom.error("control.placement.per_cm2", what, help).into());
             }
-            candidates(&skin.mesh, &skin.topology, CONTROL_SEED, count, &mut |_| true).map(|c| c.root).unwrap_or_default()
+            candidates(&skin.mesh, &skin.topology, CONTROL_SEED, count, &mut |_| true)
+                .map(|c| c.root)
+                .unwrap_or_default()
         }
         None => Vec::new(),
     };
-    let drawn = run.project.drawn.as_ref().map(|f| Ok::<_, Error>(curves::read(&f.path, None)?.joined())).transpose()?;
+    let drawn =
+        run.project.drawn.as_ref().map(|f| Ok::<_, Error>(curves::read(&f.path, None)?.joined())).transpose()?;
     // Partings and drawn hairs keep the distance that the density asks for, or half a centimetre.
     let half_cm = 0.5 / run.project.cm2_per_unit2().sqrt();
     let spacing = if per_unit2 > 0.0 { (0.5 / per_unit2.sqrt()).min(2.0 * half_cm) } else { half_cm };
@@ -147,7 +163,8 @@ fn place_hairs(run: &mut Runner<'_>) -> Result<(ControlHairs, Sites, Counts), Er
     if drawn.is_some() {
         let unit = run.project.shot.value.shot.meters_per_unit * 1e3;
         let (mean, max) = (c.bind_mean * unit, c.bind_max * unit);
-        run.warnings.push(format!("drawn hairs were moved onto the skin by {mean:.2} mm on average, {max:.2} mm at most"));
+        run.warnings
+            .push(format!("drawn hairs were moved onto the skin by {mean:.2} mm on average, {max:.2} mm at most"));
     }
     Ok((hairs, sites, counts))
 }
@@ -185,7 +202,7 @@ fn comb_hairs(run: &mut Runner<'_>) -> Result<ControlHairs, Error> {
     let lines = partings(run);
     let maps = comb_maps(run)?;
     let ops: Vec<CombOp<'_>> =
-        project.groom.value.comb.iter().zip(&maps).map(|(c, (region, map))| operation(run, c, region, map)).collect();
+        project.groom.value.comb.iter().zip(&maps).map(|(c, [region, map])| operation(run, c, region, map)).collect();
     let done = comb(&view(&skin), &lines, &ops, &mut hairs);
     let mut counts = Counts::from([
         ("control hairs combed".to_owned(), done.iter().map(|c| c.combed).max().unwrap_or(0) as u64),
@@ -209,12 +226,12 @@ fn comb_hairs(run: &mut Runner<'_>) -> Result<ControlHairs, Error> {
 }
 
 /// Region and main map of every operation.
-fn comb_maps(run: &mut Runner<'_>) -> Result<Vec<(Option<TiledMap>, Option<TiledMap>)>, Error> {
+fn comb_maps(run: &mut Runner<'_>) -> Result<Vec<[Option<TiledMap>; 2]>, Error> {
     let mut out = Vec::new();
     for c in &run.project.groom.value.comb {
         let texel = if c.kind == Kind::DirectionMap { Texel::Direction } else { Texel::Value };
         let region = c.region.as_ref().map(|m| run.map(m, Texel::Value)).transpose()?;
-        out.push((region, c.map.as_ref().map(|m| run.map(m, texel)).transpose()?));
+        out.push([region, c.map.as_ref().map(|m| run.map(m, texel)).transpose()?]);
     }
     Ok(out)
 }
@@ -258,11 +275,14 @@ fn encode_hairs(hairs: &ControlHairs) -> Vec<u8> {
     columns.push(("parting", ply::Column::U32(hairs.parting.clone())));
     columns.push(("border", ply::Column::U8(hairs.border.iter().map(|b| u8::from(*b)).collect())));
     let comment = format!("control hairs, {} points each: n, du, dv along [N, dU, N x dU] from the root", hairs.points);
-    encode(&comment, &[
-        table("hair", columns),
-        table("point", vector_columns(["n", "du", "dv"], &hairs.local)),
-        table("shape", vec![("points", ply::Column::U32(vec![hairs.points as u32]))]),
-    ])
+    encode(
+        &comment,
+        &[
+            table("hair", columns),
+            table("point", vector_columns(["n", "du", "dv"], &hairs.local)),
+            table("shape", vec![("points", ply::Column::U32(vec![hairs.points as u32]))]),
+        ],
+    )
 }
 
 fn decode_hairs(bytes: &[u8]) -> Option<ControlHairs> {

@@ -28,9 +28,10 @@ pub fn candidates(run: &mut Runner<'_>, i: usize) -> Result<Candidates, Error> {
     let count = (density * skin.area()).ceil() as usize;
     check_count(run, i, count)?;
     let found = search(&skin, layer_seed(&layer.name), count);
-    let file = encode("candidate roots in blue-noise order: a prefix is as even as the whole", &[
-        table("candidate", root_columns(&found.root)),
-    ]);
+    let file = encode(
+        "candidate roots in blue-noise order: a prefix is as even as the whole",
+        &[table("candidate", root_columns(&found.root))],
+    );
     run.keep(what, Counts::from([("candidates".to_owned(), found.root.len() as u64)]), &[("data.ply", &file)])?;
     Ok(found)
 }
@@ -46,7 +47,8 @@ fn check_count(run: &Runner<'_>, i: usize, count: usize) -> Result<(), Error> {
 }
 
 fn search(skin: &Skin, seed: u32, count: usize) -> Candidates {
-    find_candidates(&skin.mesh, &skin.topology, u64::from(seed), count, &mut |_| true).expect("nothing stops the search")
+    find_candidates(&skin.mesh, &skin.topology, u64::from(seed), count, &mut |_| true)
+        .expect("nothing stops the search")
 }
 
 /// Roots of a layer's hairs: the candidates whose rank is below the local density.
@@ -77,7 +79,8 @@ fn grow(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
     let needed = density.needed_candidates(skin.area());
     if needed > candidates.root.len() {
         check_count(run, i, needed)?;
-        run.warnings.push(format!("layer {}: the density map exceeds 1; candidates beyond the cached ones", layer.name));
+        run.warnings
+            .push(format!("layer {}: the density map exceeds 1; candidates beyond the cached ones", layer.name));
         candidates = search(&skin, seed, needed);
     }
     let found = find_roots(&skin.mesh, &skin.topology, &candidates, &density, seed);
@@ -91,7 +94,8 @@ fn grow(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
         vector_columns(["u", "v"], &found.uv),
         vec![("chart", Column::U32(found.chart.clone()))],
     ];
-    let file = encode("hairs: id, root on the rest skin, texture coordinates, chart", &[table("hair", columns.concat())]);
+    let file =
+        encode("hairs: id, root on the rest skin, texture coordinates, chart", &[table("hair", columns.concat())]);
     run.keep(What::Roots(i), counts, &[("data.ply", &file)])?;
     Ok(found)
 }

@@ -331,7 +331,9 @@ fn tally(stage: Stage, ran: &[&Step], done: &[&Step]) -> (usize, usize) {
             };
             let new: BTreeSet<i32> = ran.iter().filter_map(|s| frame(s)).collect();
             let old: BTreeSet<i32> = done.iter().filter_map(|s| frame(s)).filter(|f| !new.contains(f)).collect();
-            (new.len(), old.len())
+            // On a still skin the rest pose is every frame: it ran, and stands for one of them.
+            let rest = usize::from(new.is_empty() && !ran.is_empty() && !old.is_empty());
+            (new.len() + rest, old.len() - rest)
         }
         Stage::Export | Stage::Preview => (ran.len(), done.len()),
     }

@@ -1,7 +1,9 @@
 //! Writes skins: positions, texture coordinates and triangles, binary little-endian.
 
 use pelage_geom::Mesh;
-use ply_rs::ply::{Addable, DefaultElement, ElementDef, Encoding, Ply, Property, PropertyDef, PropertyType, ScalarType};
+use ply_rs::ply::{
+    Addable, DefaultElement, ElementDef, Encoding, Ply, Property, PropertyDef, PropertyType, ScalarType,
+};
 use ply_rs::writer::Writer;
 use std::collections::BTreeMap;
 
