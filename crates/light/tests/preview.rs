@@ -211,6 +211,36 @@ fn skin_covers_its_area() {
 }
 
 #[test]
+fn no_dark_dots_on_a_lit_outline() {
+    // A coarse ball with the normals of a round one, lit from above: on its upper outline normals point up and away.
+    let n = 40u32;
+    let (mut normal, mut triangle) = (Vec::new(), Vec::new());
+    for j in 0..=n {
+        let polar = std::f64::consts::PI * f64::from(j) / f64::from(n);
+        for i in 0..n {
+            let a = std::f64::consts::TAU * (f64::from(i) + 0.37) / f64::from(n);
+            let r = libm::sin(polar);
+            normal.push([r * libm::cos(a), libm::cos(polar), r * libm::sin(a)]);
+            if j < n {
+                let at = |i: u32, j: u32| j * n + i % n;
+                triangle
+                    .extend([[at(i, j), at(i, j + 1), at(i + 1, j)], [at(i + 1, j), at(i, j + 1), at(i + 1, j + 1)]]);
+            }
+        }
+    }
+    let position: Vec<[f64; 3]> = normal.iter().map(|n| n.map(|v| 50.0 * v)).collect();
+    let normal: Vec<[f32; 3]> = normal.iter().map(|n| n.map(|v| v as f32)).collect();
+    let skin = SkinView { position: &position, triangle: &triangle, normal: &normal, color: [0.9; 3] };
+    let lights = [Light { direction: [0.0, -1.0, 0.0], color: [1.0; 3] }];
+    let settings = Settings { ambient: [0.0; 3], ..Settings::default() };
+    let image = Hairs::default().render(Some(skin), &lights, [0.9; 3], &settings);
+    // Everything higher than sin 45 degrees above the middle.
+    let top = image.rgb[..160 * (65 - 36)].iter().map(|c| c[0]);
+    assert!(top.clone().fold(1.0, f32::min) > 0.6, "{}", top.fold(1.0, f32::min));
+    assert!(image.rgb[160 * (65 + 40) + 80][0] < 0.01, "no light from below");
+}
+
+#[test]
 fn depth_decides_not_the_order_of_input() {
     let u = |i: usize, c: u64| (rng::uniform(5, i as u64, c, 0) as f32) - 0.5;
     let strand = |i: usize| {
