@@ -52,7 +52,11 @@ fn main() {
     let path = folder.join("hair.usdc");
     report("usdc verify", bytes, || usd::verify(&path, &facts, &layers).expect("the file just written"));
     let path = folder.join("hair.mcap");
-    report("mcap verify", bytes, || mcap::verify(&path, &facts, &layers).expect("the file just written"));
+    let points: Vec<usize> = layers.iter().map(|l| l.offsets.total()).collect();
+    report("mcap verify", bytes, || {
+        mcap::verify_layers(&path, &facts, &layers).expect("the file just written");
+        mcap::verify_frames(&path, &facts, &points).expect("the file just written");
+    });
     for name in ["plain.bin", "hair.usdc", "hair.mcap"] {
         std::fs::remove_file(folder.join(name)).expect("the file just written");
     }

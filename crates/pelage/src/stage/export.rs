@@ -6,7 +6,8 @@ use super::{Step, What, groom, instance, interpolate};
 use crate::Error;
 use crate::config::{ExportFormat, UpAxis};
 use crate::files::unfinished;
-use crate::format::{FormatError, HairFrame, HairLayer, ShotFacts, mcap::McapHair, ply, usd::UsdHair};
+use crate::format::mcap::{self, McapHair};
+use crate::format::{FormatError, HairFrame, HairLayer, ShotFacts, ply, usd::UsdHair};
 use pelage_geom::Offsets;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -86,13 +87,17 @@ pub fn facts(run: &mut Runner<'_>) -> Result<ShotFacts, Error> {
 }
 
 /// The parts of a layer that do not change over the shot.
-pub fn hair_layer(run: &mut Runner<'_>, i: usize) -> Result<HairLayer, Error> {
+fn hair_layer(run: &mut Runner<'_>, i: usize) -> Result<HairLayer, Error> {
+    Ok(HairLayer { rest: interpolate::positions(run, What::Rest(i))?, ..look(run, i)? })
+}
+
+/// A layer's hairs without any positions.
+pub fn look(run: &mut Runner<'_>, i: usize) -> Result<HairLayer, Error> {
     let skin = groom::skin(run)?;
     let roots = instance::roots(run, i)?;
     let width = instance::column(run, What::Width(i), i)?;
     let opacity = instance::column(run, What::Opacity(i), i)?;
     let color = instance::color(run, i)?;
-    let rest = interpolate::positions(run, What::Rest(i))?;
     let groom = &run.project.groom.value;
     let points = groom.layer[i].points.unwrap_or(groom.control.points);
     let unit_per_micrometre = (1e-6 / run.project.shot.value.shot.meters_per_unit) as f32;
@@ -105,7 +110,7 @@ pub fn hair_layer(run: &mut Runner<'_>, i: usize) -> Result<HairLayer, Error> {
         skin_bary: roots.root.iter().map(|p| p.bary).collect(),
         id: roots.id.clone(),
         root_uv: roots.uv.clone(),
-        rest,
+        rest: Vec::new(),
         width: width.iter().flat_map(|w| taper.iter().map(move |t| w * unit_per_micrometre * t)).collect(),
         color,
         opacity: opacity.iter().map(|o| o.clamp(0.0, 1.0)).collect(),
@@ -140,7 +145,12 @@ pub fn write(run: &mut Runner<'_>, what: What, format: ExportFormat) -> Result<(
             let mut file = McapHair::create(&part, &facts, &hair_layers(run)?)?;
             frames(run, &facts, |frame, hair| Ok(file.write_frame(frame, hair)?))?;
             file.finish()?;
-            crate::format::mcap::verify(&part, &facts, &hair_layers(run)?)?;
+            let points = {
+                let layers = hair_layers(run)?;
+                mcap::verify_layers(&part, &facts, &layers)?;
+                layers.iter().map(|l| l.offsets.total()).collect::<Vec<_>>()
+            };
+            mcap::verify_frames(&part, &facts, &points)?;
         }
         ExportFormat::Ply => {
             let layers = hair_layers(run)?;

@@ -6,6 +6,7 @@ use crate::Error;
 use crate::config::UpAxis;
 use crate::files::unfinished;
 use crate::format::{HairLayer, image::write_png};
+use pelage_geom::Offsets;
 use pelage_light::{Camera, HairView, Image, Scene, Settings, SkinView, contact_sheet, render, studio_lights};
 
 /// Linear grey of the background: dark enough for light hair, light enough for dark hair.
@@ -14,27 +15,30 @@ const BACKGROUND: [f32; 3] = [0.16, 0.17, 0.19];
 const SKIN: [f32; 3] = [0.42, 0.31, 0.26];
 /// Hairs of a layer that the camera is placed by: all, or as many evenly over them. The margin holds the others.
 const FRAMED: usize = 20_000;
+/// Hairs that a picture draws at most. Of more, every n-th is drawn, n times as wide: the same cover, less time and
+/// memory. A tenth of this shows single hairs as bars; ten times as many no longer fit beside a large frame.
+const DRAWN: usize = 250_000;
 /// Pictures of a contact sheet are drawn this many times as large and scaled down: hairs are thin there.
 const FINER: u32 = 2;
 
 /// Draws the still.
 pub fn still(run: &mut Runner<'_>) -> Result<(), Error> {
     let frame = run.project.still_frame();
-    let layers = layers(run)?;
-    let camera = camera(run, &layers, &[frame])?;
-    let picture = draw(run, &layers, &camera, frame, run.project.shot.value.preview.size)?;
+    let drawn = drawn(run)?;
+    let camera = camera(run, &drawn, &[frame])?;
+    let picture = draw(run, &drawn, &camera, frame, run.project.shot.value.preview.size)?;
     save(run, What::Still, "preview.png", &picture)
 }
 
 /// Draws the contact sheet: frames evenly over the shot, each a third of the still's size, seen by one camera.
 pub fn sheet(run: &mut Runner<'_>) -> Result<(), Error> {
     let frames = run.project.sheet_frames();
-    let layers = layers(run)?;
-    let camera = camera(run, &layers, &frames)?;
+    let drawn = drawn(run)?;
+    let camera = camera(run, &drawn, &frames)?;
     let size = run.project.shot.value.preview.size.map(|x| (x / 3).max(16));
     let mut pictures = Vec::new();
     for frame in &frames {
-        let mut picture = draw(run, &layers, &camera, *frame, size.map(|x| x * FINER))?.shrunk(FINER as usize);
+        let mut picture = draw(run, &drawn, &camera, *frame, size.map(|x| x * FINER))?.shrunk(FINER as usize);
         picture.draw_number(i64::from(*frame), (picture.width / 160).max(1));
         pictures.push(picture);
     }
@@ -42,19 +46,61 @@ pub fn sheet(run: &mut Runner<'_>) -> Result<(), Error> {
     save(run, What::Sheet, "sheet.png", &contact_sheet(&pictures, columns))
 }
 
-fn layers(run: &mut Runner<'_>) -> Result<Vec<HairLayer>, Error> {
-    (0..run.project.groom.value.layer.len()).map(|i| export::hair_layer(run, i)).collect()
+/// Layers to draw, and which hairs of them: every n-th.
+struct Drawn {
+    layers: Vec<HairLayer>,
+    every: usize,
+}
+
+fn drawn(run: &mut Runner<'_>) -> Result<Drawn, Error> {
+    let count = run.project.groom.value.layer.len();
+    let mut hairs = 0;
+    for i in 0..count {
+        hairs += instance::roots(run, i)?.id.len();
+    }
+    let every = hairs.div_ceil(DRAWN).max(1);
+    let layers = (0..count).map(|i| Ok(thinned(export::look(run, i)?, every))).collect::<Result<_, Error>>()?;
+    run.layers.clear();
+    Ok(Drawn { layers, every })
+}
+
+/// Every n-th hair, n times as wide. All hairs of a layer have the same number of points.
+fn thinned(layer: HairLayer, every: usize) -> HairLayer {
+    let points = layer.offsets.uniform_count().unwrap_or(1);
+    if every == 1 {
+        return layer;
+    }
+    let color: Vec<[f32; 3]> = layer.color.into_iter().step_by(every).collect();
+    HairLayer {
+        offsets: Offsets::uniform(color.len(), points),
+        width: nth(&layer.width, points, every).map(|w| w * every as f32).collect(),
+        opacity: layer.opacity.into_iter().step_by(every).collect(),
+        color,
+        ..HairLayer::default()
+    }
+}
+
+/// Values of every n-th hair of `points` values each.
+fn nth<T: Copy>(values: &[T], points: usize, every: usize) -> impl Iterator<Item = T> + '_ {
+    values.chunks(points.max(1)).step_by(every).flatten().copied()
+}
+
+/// Positions of the hairs to draw.
+fn positions(run: &mut Runner<'_>, drawn: &Drawn, i: usize, frame: i32) -> Result<Vec<[f32; 3]>, Error> {
+    let all = interpolate::positions(run, What::Frame(i, frame))?;
+    let points = drawn.layers[i].offsets.uniform_count().unwrap_or(1);
+    Ok(if drawn.every == 1 { all } else { nth(&all, points, drawn.every).collect() })
 }
 
 /// A camera that sees skin and hair at all of the frames, as near as it can.
-fn camera(run: &mut Runner<'_>, layers: &[HairLayer], frames: &[i32]) -> Result<Camera, Error> {
+fn camera(run: &mut Runner<'_>, drawn: &Drawn, frames: &[i32]) -> Result<Camera, Error> {
     let skin = groom::skin(run)?;
     let origin = skin.origin();
     let mut points = Vec::new();
     for frame in frames {
         points.extend_from_slice(&skin.pose(&run.project.frames[frame])?.position);
-        for (i, layer) in layers.iter().enumerate() {
-            let position = interpolate::positions(run, What::Frame(i, *frame))?;
+        for (i, layer) in drawn.layers.iter().enumerate() {
+            let position = positions(run, drawn, i, *frame)?;
             let hairs = layer.offsets.len();
             for hair in (0..hairs).step_by(hairs.div_ceil(FRAMED).max(1)) {
                 let hair = &position[layer.offsets.range(hair)];
@@ -68,20 +114,13 @@ fn camera(run: &mut Runner<'_>, layers: &[HairLayer], frames: &[i32]) -> Result<
     Ok(Camera::frame_points(points, shot.preview.from.map(|x| -x), up, aspect).zoomed(shot.preview.zoom))
 }
 
-fn draw(
-    run: &mut Runner<'_>,
-    layers: &[HairLayer],
-    camera: &Camera,
-    frame: i32,
-    size: [u32; 2],
-) -> Result<Image, Error> {
+fn draw(run: &mut Runner<'_>, drawn: &Drawn, camera: &Camera, frame: i32, size: [u32; 2]) -> Result<Image, Error> {
     let skin = groom::skin(run)?;
+    let layers = &drawn.layers;
     let pose = skin.pose(&run.project.frames[&frame])?;
-    let positions = (0..layers.len())
-        .map(|i| interpolate::positions(run, What::Frame(i, frame)))
-        .collect::<Result<Vec<_>, Error>>()?;
+    let positions = (0..layers.len()).map(|i| positions(run, drawn, i, frame)).collect::<Result<Vec<_>, Error>>()?;
     let normals = (0..layers.len())
-        .map(|i| Ok(instance::roots(run, i)?.root.iter().map(|p| skin.normal(&pose, p)).collect()))
+        .map(|i| Ok(instance::roots(run, i)?.root.iter().step_by(drawn.every).map(|p| skin.normal(&pose, p)).collect()))
         .collect::<Result<Vec<Vec<[f32; 3]>>, Error>>()?;
     let views: Vec<HairView<'_>> = (0..layers.len())
         .map(|i| HairView {

@@ -4,7 +4,7 @@
 //!   are protobuf messages (`pelage.HairTopology`, `pelage.HairFrame`) whose description is in the file, so any MCAP
 //!   reader decodes them. `log_time` is the time of the frame in nanoseconds since the first frame, `sequence` the
 //!   frame number. The facts of the shot are in the metadata record `pelage.shot`.
-//! * [`read_hair_mcap`] reads such a file frame by frame, [`verify`] compares it with what should be in it.
+//! * [`read_hair_mcap`] reads such a file frame by frame, [`verify_layers`] and [`verify_frames`] compare it with what should be in it.
 //! * [`write_frame_payload`] and [`read_frame_payload`] hold the positions of one frame and nothing else.
 //! * [`inspect`] says what is in any MCAP file.
 //!
@@ -20,7 +20,7 @@ mod write;
 
 pub use inspect::{McapChannel, McapSummary, inspect};
 pub use payload::{read_frame_payload, write_frame_payload};
-pub use read::{HairMcap, McapFrame, read_hair_mcap, verify};
+pub use read::{HairMcap, McapFrame, read_hair_mcap, verify_frames, verify_layers};
 pub use write::McapHair;
 
 use super::ShotFacts;

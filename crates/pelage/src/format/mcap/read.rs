@@ -247,35 +247,46 @@ impl Index {
     }
 }
 
-/// Reads `path` back and compares it with what [`McapHair`](super::McapHair) was given: the facts, every column of
-/// every layer, and for every frame its time, its number of points and that all values are finite.
-pub fn verify(path: &Path, facts: &ShotFacts, layers: &[HairLayer]) -> Result<(), FormatError> {
-    let bad = |what: String| FormatError::new(path, what).hint("the file is not what was exported: export it again");
+/// Opens an exported file again and compares facts and layers with what was exported.
+pub fn verify_layers(path: &Path, facts: &ShotFacts, layers: &[HairLayer]) -> Result<(), FormatError> {
     let mut file = read_hair_mcap(path)?;
     let mut expected = facts.clone();
     expected.extra.sort();
     if *file.facts() != expected {
-        return Err(bad("its facts differ from what was exported".into()));
+        return Err(not_exported(path, "its facts differ from what was exported"));
     }
     if !file.layer_names().eq(layers.iter().map(|l| l.name.as_str())) {
-        return Err(bad("its layers differ from what was exported".into()));
+        return Err(not_exported(path, "its layers differ from what was exported"));
     }
     for (i, layer) in layers.iter().enumerate() {
-        let at = format!("layer {:?}", layer.name);
         if file.layer(i)? != *layer {
-            return Err(bad("a column differs from what was exported".into()).at(at));
+            let at = format!("layer {:?}", layer.name);
+            return Err(not_exported(path, "a column differs from what was exported").at(at));
         }
+    }
+    Ok(())
+}
+
+/// Opens an exported file again and checks every frame: as many points as its layer has (`points`, one a layer), the
+/// origin, all values finite. Apart from [`verify_layers`], so that layers need not lie beside frames in memory.
+pub fn verify_frames(path: &Path, facts: &ShotFacts, points: &[usize]) -> Result<(), FormatError> {
+    let mut file = read_hair_mcap(path)?;
+    for (i, points) in points.iter().enumerate() {
         for index in 0..facts.frames.len() {
             let frame = file.frame(index, i)?;
-            let sized = frame.position.len() == layer.offsets.total() && frame.origin == facts.origin;
+            let sized = frame.position.len() == *points && frame.origin == facts.origin;
             let finite = Bounds::of(&frame.position).is_some() && Bounds::of(&frame.velocity).is_some();
             if !sized || !finite {
                 let what = if sized { "a value is not finite" } else { "the number of points or the origin is wrong" };
-                return Err(bad(what.into()).at(format!("{at}, frame {}", frame.frame)));
+                return Err(not_exported(path, what).at(format!("layer {i}, frame {}", frame.frame)));
             }
         }
     }
     Ok(())
+}
+
+fn not_exported(path: &Path, what: &str) -> FormatError {
+    FormatError::new(path, what).hint("the file is not what was exported: export it again")
 }
 
 #[cfg(test)]
@@ -306,7 +317,10 @@ mod tests {
         let (facts, layers) = samples::shot();
         let path = dir.path().join("a.mcap");
         let bytes = write(&path, &facts, &layers);
-        verify(&path, &facts, &layers).unwrap();
+        verify_layers(&path, &facts, &layers).unwrap();
+        let points: Vec<usize> = layers.iter().map(|l| l.offsets.total()).collect();
+        verify_frames(&path, &facts, &points).unwrap();
+        assert!(verify_frames(&path, &facts, &points.iter().map(|n| n + 1).collect::<Vec<_>>()).is_err());
         let mut file = read_hair_mcap(&path).unwrap();
         assert_eq!(file.facts(), &facts);
         for (i, layer) in layers.iter().enumerate() {
@@ -347,7 +361,10 @@ mod tests {
         let layers = [layer.clone(), HairLayer { name: "small".into(), ..layer }];
         let path = dir.path().join("a.mcap");
         write(&path, &facts, &layers);
-        verify(&path, &facts, &layers).unwrap();
+        verify_layers(&path, &facts, &layers).unwrap();
+        let points: Vec<usize> = layers.iter().map(|l| l.offsets.total()).collect();
+        verify_frames(&path, &facts, &points).unwrap();
+        assert!(verify_frames(&path, &facts, &points.iter().map(|n| n + 1).collect::<Vec<_>>()).is_err());
         assert!(inspect(&path).unwrap().chunks > 5);
     }
 
@@ -372,10 +389,10 @@ mod tests {
         write(&path, &facts, &layers);
         let mut other = layers.clone();
         other[1].id[0] += 1;
-        assert!(verify(&path, &facts, &other).is_err());
+        assert!(verify_layers(&path, &facts, &other).is_err());
         let other = ShotFacts { fps: 25.0, ..facts.clone() };
-        assert!(verify(&path, &other, &layers).is_err());
-        assert!(verify(&path, &facts, &layers[..1]).is_err());
+        assert!(verify_layers(&path, &other, &layers).is_err());
+        assert!(verify_layers(&path, &facts, &layers[..1]).is_err());
     }
 
     /// What is read of a damaged file without an error is what was written.
