@@ -6,7 +6,7 @@
 //! changes only what lies under it. Paper §3.3 asks for counts that depend neither on map resolution nor on patch
 //! size; ranks by area give both.
 //!
-//! Method: the skin's area is laid out along a curve ([`crate::area_curve`]) and cut into equal stretches. Round by
+//! Method: the skin's area is laid out along a curve (module `area_curve`) and cut into equal stretches. Round by
 //! round every stretch gets one more point, the best of a few darts by distance to the points so far (Mitchell 1991,
 //! "Spectrally optimal sampling for distribution ray tracing"), and when the stretches are full they are halved. The
 //! stretches hold the local density to its share at every moment; the choice of darts makes the noise blue.
