@@ -2,6 +2,7 @@
 
 use super::{RunArguments, print};
 use crate::Error;
+use crate::config::ExportFormat;
 use crate::files::write_whole;
 use crate::progress::Progress;
 use crate::project::Project;
@@ -40,12 +41,25 @@ pub fn run(a: RunArguments, sheet: bool) -> Result<bool, Error> {
     let report = runner.run()?;
     drop(runner);
     let out = project.out_dir();
-    if report.ran() > 0 && out.is_dir() {
+    if report.ran() > 0 {
+        std::fs::create_dir_all(&out).map_err(Error::disk(&out))?;
         let path = out.join("report.json");
         write_whole(&path, |f| f.write_all(report.json().as_bytes())).map_err(Error::disk(&path))?;
     }
+    for name in leftovers(&project) {
+        progress.say(&format!("note: {name} in the output folder is of an earlier run: its format is not asked for"));
+    }
     print(&if a.json { report.json() } else { summary(&report, &project) });
     Ok(true)
+}
+
+/// Whole-shot files in the output folder that the shot does not ask for any more.
+fn leftovers(project: &Project) -> Vec<&'static str> {
+    let formats = &project.shot.value.export.formats;
+    let files = [(ExportFormat::Usd, "hair.usdc"), (ExportFormat::Mcap, "hair.mcap")];
+    let left =
+        files.into_iter().filter(|(format, name)| !formats.contains(format) && project.out_dir().join(name).exists());
+    left.map(|(_, name)| name).collect()
 }
 
 fn summary(report: &Report, project: &Project) -> String {
@@ -80,7 +94,7 @@ pub fn plan(a: RunArguments) -> Result<bool, Error> {
 }
 
 fn describe(stage: &PlannedStage) -> String {
-    let mut out = format!("{:<12} {:>4} to run {:>4} reused\n", stage.name, stage.run.len(), stage.reused);
+    let mut out = format!("{:<12} {:>4} steps to run {:>4} reused\n", stage.name, stage.run.len(), stage.reused);
     for reason in &stage.reasons {
         out.push_str(&format!("{:<12}   because {reason}\n", ""));
     }

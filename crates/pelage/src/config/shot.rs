@@ -39,7 +39,7 @@ pub struct Shot {
     pub fps: f64,
     /// Metres per scene unit: 1 for metres, 0.01 for centimetres.
     pub meters_per_unit: f64,
-    /// The axis that points up.
+    /// The axis that points up. Default: "y".
     #[serde(default)]
     pub up: UpAxis,
 }

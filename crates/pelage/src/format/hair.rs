@@ -2,9 +2,8 @@
 //! units nor an up axis; his own models are z-up.
 
 use super::FormatError;
-use super::ply::{Curves, read_bytes, write_whole};
-use pelage_geom::{Offsets, Strands};
-use std::io::Write;
+use super::ply::{Curves, read_bytes};
+use pelage_geom::Offsets;
 use std::path::Path;
 
 const HEADER: usize = 128;
@@ -125,56 +124,51 @@ fn parse_hair(path: &Path, bytes: &[u8]) -> Result<Curves, FormatError> {
     Ok(out)
 }
 
-/// Writes curves as a `.hair` file, with diameters as thickness if given. `info` (units, for one) is cut to 88 bytes.
-/// Positions are written with the origin added. A hair has 2 to 65,536 points.
-pub fn write_hair_file(path: &Path, strands: &Strands, width: Option<&[f32]>, info: &str) -> Result<(), FormatError> {
-    let bytes = encode(strands, width, info).map_err(|what| FormatError::new(path, what))?;
-    write_whole(path, |out| out.write_all(&bytes))
-}
-
-fn encode(strands: &Strands, width: Option<&[f32]>, info: &str) -> Result<Vec<u8>, String> {
-    let points = strands.position.len();
-    if strands.offsets.total() != points || width.is_some_and(|w| w.len() != points) {
-        return Err(format!("{points} positions do not fit the offsets or the widths"));
-    }
-    let uniform = strands.offsets.uniform_count();
-    let mut arrays = POINTS;
-    arrays |= if uniform.is_none() { SEGMENTS } else { 0 };
-    arrays |= if width.is_some() { THICKNESS } else { 0 };
-    let mut out = Vec::with_capacity(HEADER + 16 * points);
-    out.extend_from_slice(b"HAIR");
-    let segments = uniform.map_or(0, |n| n.saturating_sub(1) as u32);
-    for v in [strands.len() as u32, points as u32, arrays, segments] {
-        out.extend_from_slice(&v.to_le_bytes());
-    }
-    for v in [1.0f32, 0.0, 1.0, 1.0, 1.0] {
-        out.extend_from_slice(&v.to_le_bytes());
-    }
-    let text = info.as_bytes();
-    out.extend_from_slice(&text[..text.len().min(HEADER - out.len())]);
-    out.resize(HEADER, 0);
-    for (s, n) in strands.offsets.counts().enumerate() {
-        let Some(segments) = n.checked_sub(1).filter(|s| *s > 0).and_then(|s| u16::try_from(s).ok()) else {
-            return Err(format!("hair {s} has {n} points; the format holds 2 to 65536"));
-        };
-        if uniform.is_none() {
-            out.extend_from_slice(&segments.to_le_bytes());
-        }
-    }
-    for p in &strands.position {
-        for (x, o) in p.iter().zip(strands.origin) {
-            out.extend_from_slice(&((f64::from(*x) + o) as f32).to_le_bytes());
-        }
-    }
-    for w in width.unwrap_or_default() {
-        out.extend_from_slice(&w.to_le_bytes());
-    }
-    Ok(out)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use pelage_geom::Strands;
+
+    /// A `.hair` file of curves with the origin added, diameters as thickness if given.
+    fn encode(strands: &Strands, width: Option<&[f32]>, info: &str) -> Result<Vec<u8>, String> {
+        let points = strands.position.len();
+        if strands.offsets.total() != points || width.is_some_and(|w| w.len() != points) {
+            return Err(format!("{points} positions do not fit the offsets or the widths"));
+        }
+        let uniform = strands.offsets.uniform_count();
+        let mut arrays = POINTS;
+        arrays |= if uniform.is_none() { SEGMENTS } else { 0 };
+        arrays |= if width.is_some() { THICKNESS } else { 0 };
+        let mut out = Vec::with_capacity(HEADER + 16 * points);
+        out.extend_from_slice(b"HAIR");
+        let segments = uniform.map_or(0, |n| n.saturating_sub(1) as u32);
+        for v in [strands.len() as u32, points as u32, arrays, segments] {
+            out.extend_from_slice(&v.to_le_bytes());
+        }
+        for v in [1.0f32, 0.0, 1.0, 1.0, 1.0] {
+            out.extend_from_slice(&v.to_le_bytes());
+        }
+        let text = info.as_bytes();
+        out.extend_from_slice(&text[..text.len().min(HEADER - out.len())]);
+        out.resize(HEADER, 0);
+        for (s, n) in strands.offsets.counts().enumerate() {
+            let Some(segments) = n.checked_sub(1).filter(|s| *s > 0).and_then(|s| u16::try_from(s).ok()) else {
+                return Err(format!("hair {s} has {n} points; the format holds 2 to 65536"));
+            };
+            if uniform.is_none() {
+                out.extend_from_slice(&segments.to_le_bytes());
+            }
+        }
+        for p in &strands.position {
+            for (x, o) in p.iter().zip(strands.origin) {
+                out.extend_from_slice(&((f64::from(*x) + o) as f32).to_le_bytes());
+            }
+        }
+        for w in width.unwrap_or_default() {
+            out.extend_from_slice(&w.to_le_bytes());
+        }
+        Ok(out)
+    }
 
     fn strands(counts: &[usize]) -> Strands {
         let n: usize = counts.iter().sum();

@@ -20,7 +20,7 @@ use std::rc::Rc;
 const CONTROL_SEED: u64 = 1 << 32;
 
 /// Control hairs are combed by a person: more of them are a mistake of units.
-const MAX_CONTROL: usize = 10_000_000;
+const MAX_CONTROL: usize = 1_000_000;
 
 /// The rest skin, read once a run.
 pub fn skin(run: &mut Runner<'_>) -> Result<Rc<Skin>, Error> {

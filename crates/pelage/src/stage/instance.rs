@@ -7,12 +7,15 @@ use super::{Skin, What, candidate_density, groom, layer_seed};
 use crate::Error;
 use crate::config::{Feature, MapRef};
 use crate::format::ply::Column;
-use pelage_geom::{TiledMap, rng};
+use pelage_geom::{SurfacePoint, TiledMap, rng};
 use pelage_groom::candidates::{Candidates, candidates as find_candidates};
 use pelage_groom::instance::{Density, Feature as FeatureSource, Roots, colour_column, feature_column};
 use pelage_groom::instance::{roots as find_roots, weights as find_weights};
 use pelage_groom::triangulate::{mirrored_charts, triangulate};
 use std::rc::Rc;
+
+/// How many doublings of a layer's density are looked for in the cache: more have hardly been there.
+const MOST_LEVELS: u32 = 12;
 
 /// Blue-noise candidate roots of a layer.
 pub fn candidates(run: &mut Runner<'_>, i: usize) -> Result<Candidates, Error> {
@@ -27,13 +30,31 @@ pub fn candidates(run: &mut Runner<'_>, i: usize) -> Result<Candidates, Error> {
     let density = candidate_density(layer.density.value) * run.project.cm2_per_unit2();
     let count = (density * skin.area()).ceil() as usize;
     check_count(run, i, count)?;
-    let found = search(&skin, layer_seed(&layer.name), count);
+    let found = match longer(run, i, count) {
+        Some(root) => Candidates { root, area: skin.area() },
+        None => search(&skin, layer_seed(&layer.name), count),
+    };
     let file = encode(
         "candidate roots in blue-noise order: a prefix is as even as the whole",
         &[table("candidate", root_columns(&found.root))],
     );
     run.keep(what, Counts::from([("candidates".to_owned(), found.root.len() as u64)]), &[("data.ply", &file)])?;
     Ok(found)
+}
+
+/// The first `count` of a longer list in the cache, from a time when the layer was denser: a prefix is the same list.
+fn longer(run: &Runner<'_>, i: usize, count: usize) -> Option<Vec<SurfacePoint>> {
+    let mut recipe = run.plan.step(What::Candidates(i)).recipe.clone();
+    let field = recipe.fields.iter().position(|f| f.name == "per_cm2")?;
+    let level: f64 = recipe.fields[field].value.parse().ok()?;
+    let mut keys = (1..=MOST_LEVELS).map(|k| {
+        recipe.fields[field].value = (level * f64::from(1u32 << k)).to_string();
+        recipe.key()
+    });
+    let key = keys.find(|key| run.store.contains(key))?;
+    let mut root = roots_of(decode(run.store.get(&key)?.payload.first()?)?.get("candidate")?)?;
+    root.truncate(count);
+    (root.len() == count).then_some(root)
 }
 
 /// Ids number the candidates of a layer with 32 bits.
