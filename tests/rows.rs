@@ -133,7 +133,15 @@ fn density_value() {
         "grooms/ball.toml: layer[0].density.value 3 -> 5",
         "grooms/ball.toml: layer[0].density.value (candidates) 4 -> 8",
     ];
-    expect(&shot, &with_files(&["instance/candidates/under", "instance/*/under", "interpolate/under/*"]), &why);
+    let names = with_files(&["instance/candidates/under", "instance/*/under", "interpolate/under/*"]);
+    expect(&shot, &names, &why);
+    // Far below, they are the beginning of the longer list.
+    shot.edit(GROOM, "value = 5.0, map", "value = 1.5, map");
+    let why = [
+        "grooms/ball.toml: layer[0].density.value 5 -> 1.5",
+        "grooms/ball.toml: layer[0].density.value (candidates) 8 -> 2",
+    ];
+    expect(&shot, &names, &why);
 }
 
 #[test]
