@@ -136,6 +136,18 @@ fn the_laws_of_the_coat_hold_on_the_bust() {
     }
 }
 
+#[test]
+fn no_control_hair_enters_the_fox() {
+    let shot = ShotFolder::new(COMMAND);
+    sample::files(Sample::Animal).iter().for_each(|(name, bytes)| shot.write(name, bytes));
+    let project = Project::open(&shot.path().join("pipeline.toml")).unwrap_or_else(|e| panic!("{e}"));
+    let mut progress = Progress::new(true);
+    let mut run = Runner::new(&project, Options::default(), &mut progress).unwrap_or_else(|e| panic!("{e}"));
+    let skin = groom::skin(&mut run).unwrap_or_else(|e| panic!("{e}"));
+    let control = groom::combed(&mut run).unwrap_or_else(|e| panic!("{e}"));
+    no_control_hair_enters(&skin, &control, 0.1);
+}
+
 fn size(mesh: &Mesh) -> f64 {
     let (low, high) = mesh.bounds();
     (Vec3::from(high) - Vec3::from(low)).norm()
