@@ -1,4 +1,4 @@
-//! Pictures in memory: tone curve, contact sheets, frame numbers, a heat map.
+//! Pictures in memory: tone curve, contact sheets, frame numbers.
 
 use rayon::prelude::*;
 
@@ -130,23 +130,6 @@ pub fn contact_sheet(images: &[Image], columns: usize) -> Image {
     sheet
 }
 
-/// Colour of a number in [0, 1], linear: from deep blue over teal and green to yellow, lightness rising evenly.
-/// Outside, the ends go on; a number that is not one is magenta.
-pub fn heat(t: f32) -> [f32; 3] {
-    const STOP: [[u8; 3]; 6] =
-        [[48, 18, 92], [52, 72, 146], [30, 124, 148], [44, 170, 118], [142, 208, 74], [250, 232, 60]];
-    if t.is_nan() {
-        return [1.0, 0.0, 1.0];
-    }
-    let x = t.clamp(0.0, 1.0) * (STOP.len() - 1) as f32;
-    let k = (x as usize).min(STOP.len() - 2);
-    let f = x - k as f32;
-    std::array::from_fn(|i| {
-        let (a, b) = (linear(STOP[k][i]), linear(STOP[k + 1][i]));
-        a + (b - a) * f
-    })
-}
-
 /// 5 x 7 dots of a digit or a minus sign, a row a byte, the leftmost dot in bit 4.
 fn glyph(c: u8) -> [u8; 7] {
     match c {
@@ -210,16 +193,5 @@ mod tests {
         assert_eq!(light as u32, dots * 4);
         Image::filled(3, 2, [0.0; 3]).draw_number(i64::MIN, 9);
         Image::default().draw_number(1, 1);
-    }
-
-    #[test]
-    fn heat_gets_lighter_all_the_way() {
-        let light = |t: f32| {
-            let c = heat(t);
-            0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]
-        };
-        assert!((0..100).all(|i| light(i as f32 * 0.01) < light((i + 1) as f32 * 0.01)));
-        assert_eq!(heat(-3.0), heat(0.0));
-        assert_eq!(heat(f32::NAN), [1.0, 0.0, 1.0]);
     }
 }

@@ -14,7 +14,7 @@ mod skin_map;
 mod slab;
 
 pub use camera::{Camera, View};
-pub use image::{Image, contact_sheet, heat};
+pub use image::{Image, contact_sheet};
 pub use preview::{HairView, RenderCounts, Scene, Settings, SkinView, render};
 pub use shade::{HairShade, Light, studio_lights};
 

@@ -59,12 +59,8 @@ pub fn parse_mesh(path: &Path, bytes: &[u8]) -> Result<ReadMesh, FormatError> {
     Ok(ReadMesh { mesh, faces: face_count, vertex_normals_present: elements.iter().any(named), warnings })
 }
 
-/// Reads one frame of a deforming skin: positions only, in the vertex order of the rest pose.
-pub fn read_positions(path: &Path, expected_vertices: usize) -> Result<Vec<[f64; 3]>, FormatError> {
-    parse_positions(path, &read_bytes(path)?, expected_vertices, None)
-}
-
-/// [`read_positions`] for a rest pose of so many vertices and faces: where the frame has faces, it must have as many.
+/// Reads one frame of a deforming skin: positions only, in the vertex order of a rest pose of so many vertices and
+/// faces. Where the frame has faces, it must have as many.
 pub fn read_frame(path: &Path, vertices: usize, faces: usize) -> Result<Vec<[f64; 3]>, FormatError> {
     parse_positions(path, &read_bytes(path)?, vertices, Some(faces))
 }

@@ -11,7 +11,7 @@ mod source;
 mod table;
 
 pub use curves::{Curves, parse_curves, read_curves, write_hair};
-pub use mesh::{ReadMesh, parse_mesh, read_frame, read_mesh, read_positions};
+pub use mesh::{ReadMesh, parse_mesh, read_frame, read_mesh};
 pub use mesh_out::mesh_bytes;
 pub(in crate::format) use source::read_bytes;
 pub use table::{Column, MAX_COLUMNS, Table, Tables, join_ids, parse_tables, read_tables, split_ids, write_tables};
