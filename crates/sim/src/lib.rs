@@ -1,1 +1,16 @@
-//! Hair with time: the model, its state and the step. Nothing is here yet; hairs ride the skin in their root frames.
+//! Hair with time: strand models, their state and the step; forces; what hair collides with.
+//!
+//! SI units throughout: metres, seconds, kilograms. Positions are in the world, axes as in the scene.
+
+pub mod body;
+pub mod simulation;
+pub mod wind;
+
+pub use body::{Body, Motion, Part, Rigid, Shape};
+pub use simulation::{
+    Hairs, Material, Model, Root, Settings, SimError, Simulation, Span, SpanReport, Started, StiffenedStrand,
+};
+pub use wind::Wind;
+
+/// Three coordinates.
+pub type Vec3 = nalgebra::Vector3<f64>;
