@@ -2,7 +2,9 @@
 //!
 //! SI units throughout: metres, seconds, kilograms. Positions are in the world, axes as in the scene.
 
+pub mod band;
 pub mod body;
+pub mod lanes;
 pub mod simulation;
 pub mod wind;
 
