@@ -4,13 +4,17 @@
 
 pub mod band;
 pub mod body;
+pub mod group;
+pub mod integrate;
 pub mod lanes;
+pub mod rod;
 pub mod simulation;
+pub mod stage;
 pub mod wind;
 
 pub use body::{Body, Motion, Part, Rigid, Shape};
 pub use simulation::{
-    Hairs, Material, Model, Root, Settings, SimError, Simulation, Span, SpanReport, Started, StiffenedStrand,
+    End, Hairs, Material, Model, Root, Settings, SimError, Simulation, Span, SpanReport, Started, StiffenedStrand,
 };
 pub use wind::Wind;
 

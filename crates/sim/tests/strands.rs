@@ -1,0 +1,74 @@
+//! Strands against closed forms and laws.
+
+use pelage_geom::Offsets;
+use pelage_sim::{Body, End, Hairs, Material, Model, Rigid, Root, Settings, Simulation, Span};
+
+fn still(_: f64) -> Rigid {
+    Rigid::default()
+}
+
+/// Material with the given w L^3 / B for a rod of length 1 m under 9.81 m/s2, hardly extensible.
+fn material(gamma: f64) -> Material {
+    let m = Material { drag_factor: 0.0, damping: 0.0, diameter: 1e-3, ..Material::default() };
+    let area = std::f64::consts::FRAC_PI_4 * 1e-6;
+    let bend = m.density * area * 9.81 / gamma;
+    Material { young: bend / (area * 1e-6 / 16.0), ..m }
+}
+
+fn straight(segments: usize) -> Vec<[f64; 3]> {
+    (0..=segments).map(|i| [i as f64 / segments as f64, 0.0, 0.0]).collect()
+}
+
+fn released(segments: usize, steps: u32, gamma: f64, tolerance: f64) -> Vec<[f64; 3]> {
+    let points = straight(segments);
+    let settings = Settings {
+        model: Model::Rod,
+        root: End::Clamped,
+        material: material(gamma),
+        substeps: Some(steps),
+        sag_free: false,
+        tolerance,
+        largest_turn: 10.0,
+        sleep: false,
+        ..Settings::default()
+    };
+    let offsets = Offsets::uniform(1, points.len());
+    let hairs = Hairs { offsets: &offsets, position: &points, id: &[1] };
+    let g = [0.0, -9.81, 0.0];
+    let (mut sim, _) = Simulation::new(&hairs, &settings, g).unwrap();
+    let root = [Root { position: points[0], rotation: [0.0, 0.0, 0.0, 1.0] }];
+    let body = Body::default();
+    let seconds = (1.0f64 / 9.81).sqrt();
+    let mut tips = Vec::new();
+    for k in 0..3 {
+        let span = Span {
+            seconds,
+            time: f64::from(k) * seconds,
+            motion: &still,
+            roots: [&root, &root],
+            tips: None,
+            body: &body,
+            gravity: [g, g],
+            wind: None,
+        };
+        let r = sim.advance(&span, &|_| true).unwrap();
+        let p = sim.positions();
+        tips.push(p[segments]);
+        println!(
+            "{segments} segments, {steps} steps: tip {:?} strain {:.1e} solves per node and stage {:.2} subdivided {}",
+            p[segments], r.largest_strain, r.particle_solves as f64 / r.particle_steps as f64 / 2.0, r.subdivided
+        );
+    }
+    tips
+}
+
+#[test]
+fn a_horizontal_rod_swings_as_it_should() {
+    let exact = [[0.75934, -0.60859], [0.01636, -0.84852], [0.73460, -0.63972]];
+    for (segments, steps, tolerance) in [(50, 50, 1e-7), (50, 100, 1e-7), (50, 200, 1e-7), (50, 400, 1e-7), (50, 100, 1e-4), (50, 400, 1e-4), (50, 400, 1e-5), (100, 400, 1e-7), (100, 800, 1e-7)] {
+        println!("tolerance {tolerance:e}");
+        let tips = released(segments, steps, 9.45, tolerance);
+        let error: Vec<f64> = tips.iter().zip(&exact).map(|(t, e)| ((t[0] - e[0]).powi(2) + (t[1] - e[1]).powi(2)).sqrt()).collect();
+        println!("   errors {error:?}");
+    }
+}
