@@ -42,51 +42,49 @@ pub fn eliminate<L: Lanes, const D: usize, const ROWS: usize>(
     factor: &mut Column<D, ROWS>,
     rhs: &mut [[Pack; D]],
 ) {
-    let zero = L::splat(0.0);
     let one = L::splat(1.0);
-    let mut u = window[j % RING].0;
-    let mut l = [[zero; D]; ROWS];
-    let mut inverse = [zero; D];
+    let here = j % RING;
+    // In place and entry by entry: whole panels do not fit the registers, and copying them costs as much as the sums.
     for c in 0..D {
-        inverse[c] = one / u[c][c];
+        let inverse = one / window[here].0[c][c];
+        inverse.store(&mut factor[c][c]);
         for r in c + 1..ROWS {
-            l[r][c] = u[r][c] * inverse[c];
+            (window[here].0[r][c] * inverse).store(&mut factor[r][c]);
         }
         for k in c + 1..D {
+            let u = window[here].0[k][c];
             for r in k..ROWS {
-                u[r][k] = l[r][c].neg_mul_add(u[k][c], u[r][k]);
+                window[here].0[r][k] = L::load(&factor[r][c]).neg_mul_add(u, window[here].0[r][k]);
             }
         }
     }
-    // Forward substitution within the block.
-    let mut y: [L; D] = std::array::from_fn(|c| L::load(&rhs[j][c]));
     for c in 0..D {
+        let y = L::load(&rhs[j][c]);
         for r in c + 1..D {
-            y[r] = l[r][c].neg_mul_add(y[c], y[r]);
+            let l = L::load(&factor[r][c]);
+            l.neg_mul_add(y, L::load(&rhs[j][r])).store(&mut rhs[j][r]);
         }
     }
-    // Later panels and right-hand sides.
     let mut first = D;
     let mut next = j + 1;
     while first < ROWS {
-        let panel = &mut window[next % RING].0;
         let width = if ROWS - first < D { ROWS - first } else { D };
         for r in first..ROWS {
             let to = r - first;
             for k in 0..width {
                 if to >= k {
-                    let mut sum = panel[to][k];
+                    let mut sum = window[next % RING].0[to][k];
                     for c in 0..D {
-                        sum = l[r][c].neg_mul_add(u[first + k][c], sum);
+                        sum = L::load(&factor[r][c]).neg_mul_add(window[here].0[first + k][c], sum);
                     }
-                    panel[to][k] = sum;
+                    window[next % RING].0[to][k] = sum;
                 }
             }
         }
         for k in 0..width {
             let mut sum = L::load(&rhs[next][k]);
             for c in 0..D {
-                sum = l[first + k][c].neg_mul_add(y[c], sum);
+                sum = L::load(&factor[first + k][c]).neg_mul_add(L::load(&rhs[j][c]), sum);
             }
             sum.store(&mut rhs[next][k]);
         }
@@ -94,11 +92,7 @@ pub fn eliminate<L: Lanes, const D: usize, const ROWS: usize>(
         next += 1;
     }
     for c in 0..D {
-        (y[c] * inverse[c]).store(&mut rhs[j][c]);
-        inverse[c].store(&mut factor[c][c]);
-        for r in c + 1..ROWS {
-            l[r][c].store(&mut factor[r][c]);
-        }
+        (L::load(&rhs[j][c]) * L::load(&factor[c][c])).store(&mut rhs[j][c]);
     }
 }
 
@@ -108,8 +102,11 @@ pub fn substitute<L: Lanes, const D: usize, const ROWS: usize>(
     j: usize,
     factor: &Column<D, ROWS>,
     rhs: &mut [[Pack; D]],
-) -> [L; D] {
-    let mut x: [L; D] = std::array::from_fn(|c| L::load(&rhs[j][c]));
+) {
+    let mut x = [L::splat(0.0); D];
+    for c in 0..D {
+        x[c] = L::load(&rhs[j][c]);
+    }
     for r in (D..ROWS).rev() {
         let known = L::load(&rhs[j + r / D][r % D]);
         for c in 0..D {
@@ -124,7 +121,6 @@ pub fn substitute<L: Lanes, const D: usize, const ROWS: usize>(
     for c in 0..D {
         x[c].store(&mut rhs[j][c]);
     }
-    x
 }
 
 /// Solution with an existing factor: forward, diagonal, backward. `rhs` must reach `ROWS / D` nodes beyond the last.
@@ -132,7 +128,10 @@ pub fn substitute<L: Lanes, const D: usize, const ROWS: usize>(
 pub fn solve<L: Lanes, const D: usize, const ROWS: usize>(factor: &[Column<D, ROWS>], rhs: &mut [[Pack; D]]) {
     for j in 0..factor.len() {
         let f = &factor[j];
-        let mut y: [L; D] = std::array::from_fn(|c| L::load(&rhs[j][c]));
+        let mut y = [L::splat(0.0); D];
+        for c in 0..D {
+            y[c] = L::load(&rhs[j][c]);
+        }
         for c in 0..D {
             for r in c + 1..D {
                 y[r] = L::load(&f[r][c]).neg_mul_add(y[c], y[r]);

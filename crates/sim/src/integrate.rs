@@ -319,7 +319,8 @@ impl Kernel for Predict<'_> {
         let h = L::splat(self.h);
         let inverse = L::splat(1.0 / self.h);
         let rest = L::splat(self.rest);
-        let fall: L3<L> = self.gravity.map(L::splat);
+        let [x, y, z] = self.gravity;
+        let fall: L3<L> = [L::splat(x), L::splat(y), L::splat(z)];
         for (i, m) in self.motion.iter_mut().enumerate() {
             let x = load3::<L>(&m.x);
             let (base, from, a) = if self.second {

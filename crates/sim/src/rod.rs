@@ -189,6 +189,18 @@ struct Weight<L> {
     damped: [L; 3],
 }
 
+/// Component `r` of three vectors.
+#[inline(always)]
+fn column<L: Lanes>(v: &[L3<L>; 3], r: usize) -> L3<L> {
+    [v[0][r], v[1][r], v[2][r]]
+}
+
+/// Products, one by one.
+#[inline(always)]
+fn times<L: Lanes>(a: L3<L>, b: L3<L>) -> L3<L> {
+    [a[0] * b[0], a[1] * b[1], a[2] * b[2]]
+}
+
 /// Adds a hinge at node `i` (edges `i - 1` and `i`).
 #[inline(always)]
 fn add_hinge<L: Lanes, const D: usize, const ROWS: usize>(
@@ -198,22 +210,19 @@ fn add_hinge<L: Lanes, const D: usize, const ROWS: usize>(
     window: &mut Window<L, D, ROWS>,
     rhs: &mut [[Pack; D]],
 ) {
-    let sum = |x: [L; 3], y: [L; 3]| x[0].mul_add(y[0], x[1].mul_add(y[1], x[2] * y[2]));
-    let column = |v: &[L3<L>; 3], r: usize| [v[0][r], v[1][r], v[2][r]];
-    let weighted = |v: [L; 3]| [v[0] * w.damped[0], v[1] * w.damped[1], v[2] * w.damped[2]];
     let (mut aa, mut ab, mut bb) = ([[L::splat(0.0); 3]; 3], [[L::splat(0.0); 3]; 3], [[L::splat(0.0); 3]; 3]);
     for r in 0..3 {
         let (a, b) = (column(&h.a, r), column(&h.b, r));
-        let (fa, fb) = (sum(w.force, a), sum(w.force, b));
+        let (fa, fb) = (dot(w.force, a), dot(w.force, b));
         (L::load(&rhs[i - 1][r]) + fa).store(&mut rhs[i - 1][r]);
         (L::load(&rhs[i][r]) + (fb - fa)).store(&mut rhs[i][r]);
         (L::load(&rhs[i + 1][r]) - fb).store(&mut rhs[i + 1][r]);
-        let (wa, wb) = (weighted(a), weighted(b));
+        let (wa, wb) = (times(a, w.damped), times(b, w.damped));
         for c in 0..3 {
-            ab[r][c] = sum(wa, column(&h.b, c));
+            ab[r][c] = dot(wa, column(&h.b, c));
             if c <= r {
-                aa[r][c] = sum(wa, column(&h.a, c));
-                bb[r][c] = sum(wb, column(&h.b, c));
+                aa[r][c] = dot(wa, column(&h.a, c));
+                bb[r][c] = dot(wb, column(&h.b, c));
                 (aa[c][r], bb[c][r]) = (aa[r][c], bb[r][c]);
             }
         }
@@ -250,21 +259,18 @@ fn add_turns<L: Lanes, const D: usize, const ROWS: usize>(
     window: &mut Window<L, D, ROWS>,
     rhs: &mut [[Pack; D]],
 ) {
-    let sum = |x: [L; 3], y: [L; 3]| x[0].mul_add(y[0], x[1].mul_add(y[1], x[2] * y[2]));
-    let turns = |k: usize| [h.turn[0][k], h.turn[1][k], h.turn[2][k]];
-    let weighted = |v: [L; 3]| [v[0] * w.damped[0], v[1] * w.damped[1], v[2] * w.damped[2]];
-    let (p, q) = (weighted(turns(0)), weighted(turns(1)));
+    let (t0, t1) = ([h.turn[0][0], h.turn[1][0], h.turn[2][0]], [h.turn[0][1], h.turn[1][1], h.turn[2][1]]);
+    let (p, q) = (times(t0, w.damped), times(t1, w.damped));
     let t = 3;
-    for (node, k) in [(i - 1, 0), (i, 1)] {
-        (L::load(&rhs[node][t]) - sum(w.force, turns(k))).store(&mut rhs[node][t]);
-    }
+    (L::load(&rhs[i - 1][t]) - dot(w.force, t0)).store(&mut rhs[i - 1][t]);
+    (L::load(&rhs[i][t]) - dot(w.force, t1)).store(&mut rhs[i][t]);
     let first = &mut window[(i - 1) % RING].0;
-    first[t][t] = first[t][t] + sum(p, turns(0));
-    first[D + t][t] = first[D + t][t] + sum(p, turns(1));
+    first[t][t] = first[t][t] + dot(p, t0);
+    first[D + t][t] = first[D + t][t] + dot(p, t1);
     for r in 0..3 {
         let a = [h.a[0][r], h.a[1][r], h.a[2][r]];
         let b = [h.b[0][r], h.b[1][r], h.b[2][r]];
-        let (pa, pb, qa) = (sum(p, a), sum(p, b), sum(q, a));
+        let (pa, pb, qa) = (dot(p, a), dot(p, b), dot(q, a));
         // Turn of the first edge against the three nodes.
         first[t][r] = first[t][r] - pa;
         first[D + r][t] = first[D + r][t] + pa - pb;
@@ -273,11 +279,11 @@ fn add_turns<L: Lanes, const D: usize, const ROWS: usize>(
         first[D + t][r] = first[D + t][r] - qa;
     }
     let middle = &mut window[i % RING].0;
-    middle[t][t] = middle[t][t] + sum(q, turns(1));
+    middle[t][t] = middle[t][t] + dot(q, t1);
     for r in 0..3 {
         let a = [h.a[0][r], h.a[1][r], h.a[2][r]];
         let b = [h.b[0][r], h.b[1][r], h.b[2][r]];
-        let (qa, qb) = (sum(q, a), sum(q, b));
+        let (qa, qb) = (dot(q, a), dot(q, b));
         middle[t][r] = middle[t][r] + qa - qb;
         middle[D + r][t] = middle[D + r][t] + qb;
     }
@@ -407,6 +413,23 @@ fn open_turn<L: Lanes, const D: usize, const ROWS: usize>(
     }
 }
 
+#[inline(always)]
+fn delta<L: Lanes, const D: usize>(rhs: &[Pack; D]) -> L3<L> {
+    [L::load(&rhs[0]), L::load(&rhs[1]), L::load(&rhs[2])]
+}
+
+/// `x + d scale` where the scale is above 0.
+#[inline(always)]
+fn moved<L: Lanes>(x: L3<L>, d: L3<L>, scale: L) -> L3<L> {
+    let zero = L::splat(0.0);
+    let to = mul_add3(d, scale, x);
+    [
+        L::if_gt(scale, zero, to[0], x[0]),
+        L::if_gt(scale, zero, to[1], x[1]),
+        L::if_gt(scale, zero, to[2], x[2]),
+    ]
+}
+
 /// Moves the nodes and frames by the solution, no segment by more than [`LARGEST_TURN`]; returns the square of the
 /// largest movement over the edge's length.
 #[inline(always)]
@@ -419,11 +442,10 @@ pub fn apply<L: Lanes, const D: usize, const ROWS: usize>(
 ) -> L {
     let (zero, one) = (L::splat(0.0), L::splat(1.0));
     let n = nodes.len();
-    let delta = |j: usize| -> L3<L> { std::array::from_fn(|c| L::load(&scratch.rhs[j][c])) };
     let mut largest = zero;
-    let mut last = delta(0);
+    let mut last = delta::<L, D>(&scratch.rhs[0]);
     for j in 1..n {
-        let d = delta(j);
+        let d = delta::<L, D>(&scratch.rhs[j]);
         let length = L::load(&nodes[j - 1].length);
         let bend = sub3(d, last);
         largest = largest.max((dot(bend, bend) / (length * length)).max(zero));
@@ -436,20 +458,20 @@ pub fn apply<L: Lanes, const D: usize, const ROWS: usize>(
     let limit = L::splat(LARGEST_TURN * LARGEST_TURN);
     let scale = L::if_gt(largest, limit, (limit / largest).sqrt(), one);
     let on = L::load(active);
-    let step = |j: usize, c: usize| L::if_gt(on, zero, L::load(&scratch.rhs[j][c]) * scale, zero);
-    let moved = |j: usize, x: L3<L>| -> L3<L> { std::array::from_fn(|c| x[c] + step(j, c)) };
+    // Not a product with `active`: what is not a number must stay out of lanes that are done.
+    let scale = L::if_gt(on, zero, scale, zero);
     let mut old = load3::<L>(&motion[0].x);
-    let mut new = moved(0, old);
+    let mut new = moved(old, delta::<L, D>(&scratch.rhs[0]), scale);
     store3(new, &mut motion[0].x);
     for j in 1..n {
         let old_next = load3::<L>(&motion[j].x);
-        let new_next = moved(j, old_next);
+        let new_next = moved(old_next, delta::<L, D>(&scratch.rhs[j]), scale);
         store3(new_next, &mut motion[j].x);
         if D == 4 {
             let (e0, e1) = (edge(old, old_next), edge(new, new_next));
             let folded = one / (dot(e0.t, e1.t) + one).max(L::splat(FOLDED));
             let m = transport(load3(&motion[j - 1].m), e0.t, e1.t, folded);
-            let turn = step(j - 1, 3);
+            let turn = L::if_gt(scale, zero, L::load(&scratch.rhs[j - 1][3]) * scale, zero);
             (L::load(&turned[j - 1]) + turn).store(&mut turned[j - 1]);
             // Cayley's rotation: an exact rotation by almost `turn`.
             let half = turn * L::splat(0.5);
@@ -509,7 +531,8 @@ pub fn stand<L: Lanes>(
         let tension = dot(f, e1.t);
         // Forces of the hinge on the node ahead, across the edge; the torque about the edge along it, scaled by its
         // length.
-        let c: [L3<L>; 3] = std::array::from_fn(|k| mul_add3(e1.t, h.turn[k][1] * e1.inverse, h.b[k]));
+        let lever = |k: usize| mul_add3(e1.t, h.turn[k][1] * e1.inverse, h.b[k]);
+        let c = [lever(0), lever(1), lever(2)];
         let f = mul_add3(e1.t, torque * e1.inverse, neg_mul_add3(e1.t, tension, f));
         let (c12, c20, c01) = (cross(c[1], c[2]), cross(c[2], c[0]), cross(c[0], c[1]));
         let inverse = on / L::if_gt(on, zero, dot(c[0], c12), one);

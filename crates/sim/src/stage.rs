@@ -4,8 +4,8 @@
 //! where the hair would fly freely, and `E` holds elasticity, contact, and (linearised) drag and friction. Each
 //! iteration assembles a positive definite matrix and gradient per node, solves the band directly, and moves.
 
-use crate::band::{HELD, Panel, Window};
-use crate::lanes::{L3, Lanes, Pack, dot, load3, mul_add3, sub3};
+use crate::band::{HELD, Window};
+use crate::lanes::{L3, Lanes, Pack, dot, load3, scale3, sub3};
 
 /// Longest turn of a segment in one iteration, radians. Above about 1 an iteration may jump to a wrong fold; below 0.1
 /// large steps need many iterations.
@@ -104,16 +104,23 @@ pub fn open_node<L: Lanes, const D: usize, const ROWS: usize>(
     let inverse_h = L::splat(1.0 / stage.h);
     let inertia = L::load(&node.mass) * inverse_h * inverse_h;
     let x = load3::<L>(&motion.x);
-    let mut p = Panel::<L, D, ROWS>::zero();
+    let p = &mut window[j % crate::band::RING];
+    for r in 0..ROWS {
+        for c in 0..D {
+            if r >= c {
+                p.0[r][c] = zero;
+            }
+        }
+    }
     let diagonal = inertia + L::load(&node.held);
-    let mut b = mul_add3(sub3(load3(&stage.y[j]), x), inertia, [zero; 3]);
+    let mut b = scale3(sub3(load3(&stage.y[j]), x), inertia);
     for c in 0..3 {
         p.0[c][c] = diagonal;
     }
-    let velocity = || mul_add3(sub3(x, load3(&stage.base[j])), inverse_h, [zero; 3]);
+    let velocity = scale3(sub3(x, load3(&stage.base[j])), inverse_h);
     if let Some(air) = stage.air {
         let air = &air[j];
-        let relative = sub3(velocity(), load3(&air.velocity));
+        let relative = sub3(velocity, load3(&air.velocity));
         let (across, along) = (L::load(&air.across), L::load(&air.along));
         let more = (along - across) * dot(tangent, relative);
         for r in 0..3 {
@@ -130,7 +137,7 @@ pub fn open_node<L: Lanes, const D: usize, const ROWS: usize>(
         let depth = (L::load(&contact.level) - dot(n, x)).max(zero);
         let stiffness = L::if_gt(depth, zero, L::load(&contact.stiffness), zero);
         let force = stiffness * depth;
-        let relative = sub3(velocity(), load3(&contact.velocity));
+        let relative = sub3(velocity, load3(&contact.velocity));
         let slide = crate::lanes::neg_mul_add3(n, dot(n, relative), relative);
         let speed = dot(slide, slide).sqrt().max(L::splat(STICK_SPEED));
         // The force of the last iteration sets the friction, so that the matrix stays symmetric.
@@ -144,7 +151,6 @@ pub fn open_node<L: Lanes, const D: usize, const ROWS: usize>(
             }
         }
     }
-    window[j % crate::band::RING] = p;
     for c in 0..3 {
         b[c].store(&mut rhs[c]);
     }
