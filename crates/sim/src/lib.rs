@@ -3,6 +3,7 @@
 //! SI units throughout: metres, seconds, kilograms. Positions are in the world, axes as in the scene.
 
 pub mod body;
+pub mod drag;
 pub mod simulation;
 pub mod wind;
 
