@@ -69,7 +69,7 @@ pub fn drag(air: &Air, diameter: f64, length: f64, across: f64, along: f64) -> D
     let still = 6.105 * reach.sqrt();
     Drag {
         across: 0.5 * air.viscosity * cross_flow(re + still),
-        along: air.viscosity * axial((CROSSING * re).mul_add(re, reach)),
+        along: air.viscosity * axial(reach + CROSSING * re * re),
     }
 }
 
@@ -83,7 +83,7 @@ pub fn drag(air: &Air, diameter: f64, length: f64, across: f64, along: f64) -> D
 #[inline]
 pub fn cross_flow(re: f64) -> f64 {
     let q = re.sqrt().sqrt();
-    let steady = 2.424f64.mul_add(q, 1.320).mul_add(q, 4.872).mul_add(q, 1.956);
+    let steady = 1.956 + q * (4.872 + q * (1.320 + q * 2.424));
     steady.max(1.33 * re)
 }
 
@@ -97,7 +97,7 @@ pub fn cross_flow(re: f64) -> f64 {
 #[inline]
 pub fn axial(reach: f64) -> f64 {
     let y = reach.sqrt().sqrt().sqrt();
-    6.818f64.mul_add(y, 1.113).mul_add(y, 0.564)
+    0.564 + y * (1.113 + y * 6.818)
 }
 
 #[cfg(test)]
