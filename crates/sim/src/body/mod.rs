@@ -1,5 +1,11 @@
 //! What hair can't enter, over one span of time.
 
+mod field;
+#[cfg(test)]
+mod testing;
+
+pub use field::{Bounds, Field, FieldSettings, Flow};
+
 use crate::Vec3;
 use nalgebra::{Quaternion, UnitQuaternion};
 
@@ -55,9 +61,20 @@ pub struct Part<'a> {
     pub shape: Shape<'a>,
 }
 
-/// A solid's surface in its local coordinates. Shapes are added here.
-#[derive(Clone)]
+/// A solid's surface in its local coordinates.
+#[derive(Clone, Copy)]
 pub enum Shape<'a> {
-    /// Nothing yet.
-    Empty(std::marker::PhantomData<&'a ()>),
+    /// A field that doesn't change.
+    Field(&'a Field),
+}
+
+/// A solid's surface as seen from a point, in the coordinates of the point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Distance, negative inside, metres.
+    pub distance: f64,
+    /// Unit vector in which it grows.
+    pub normal: Vec3,
+    /// Velocity of the surface, metres per second.
+    pub velocity: Vec3,
 }
