@@ -4,12 +4,12 @@
 
 pub mod band;
 pub mod body;
-pub mod contact;
 pub mod drag;
 pub mod group;
 pub mod integrate;
 pub mod lanes;
 pub mod rod;
+pub mod settle;
 pub mod simulation;
 pub mod stage;
 pub mod wind;

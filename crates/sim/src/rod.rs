@@ -323,6 +323,25 @@ pub fn solve<L: Lanes, const D: usize, const ROWS: usize>(
     stage: &mut Stage<'_>,
     scratch: &mut Scratch<D, ROWS>,
 ) {
+    sweep::<L, D, ROWS>(nodes, elastic, motion, turned, damping, stage, scratch, true);
+    for j in (0..nodes.len()).rev() {
+        band::substitute::<L, D, ROWS>(j, &scratch.factor[j], &mut scratch.rhs);
+    }
+}
+
+/// Assembles node by node and eliminates behind; without elimination, `scratch.rhs` is left with the negative gradient.
+#[allow(clippy::too_many_arguments)]
+#[inline(always)]
+pub fn sweep<L: Lanes, const D: usize, const ROWS: usize>(
+    nodes: &[Node],
+    elastic: &[Elastic],
+    motion: &[Motion],
+    turned: &[Pack],
+    damping: Damping,
+    stage: &mut Stage<'_>,
+    scratch: &mut Scratch<D, ROWS>,
+    eliminate: bool,
+) {
     let zero = L::splat(0.0);
     let n = nodes.len();
     let rhs = &mut scratch.rhs[..n + 4];
@@ -375,13 +394,12 @@ pub fn solve<L: Lanes, const D: usize, const ROWS: usize>(
             before = Some(here);
             here = next;
         }
-        if i >= 1 {
+        if eliminate && i >= 1 {
             band::eliminate::<L, D, ROWS>(i - 1, &mut window, &mut scratch.factor[i - 1], rhs);
         }
     }
-    band::eliminate::<L, D, ROWS>(n - 1, &mut window, &mut scratch.factor[n - 1], rhs);
-    for j in (0..n).rev() {
-        band::substitute::<L, D, ROWS>(j, &scratch.factor[j], rhs);
+    if eliminate {
+        band::eliminate::<L, D, ROWS>(n - 1, &mut window, &mut scratch.factor[n - 1], rhs);
     }
 }
 

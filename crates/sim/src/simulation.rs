@@ -1,8 +1,9 @@
 //! A layer of hair in motion: the constant model, the changing state, and the step over a span of time.
 
-use crate::group::{Group, Section, Strand};
+use crate::group::{Group, Strand};
+use crate::settle;
 use crate::integrate::{self, Around, Done, Interval, Method, Work};
-use crate::lanes::{self, Kernel, LANES, Lanes, Pack, Width};
+use crate::lanes::{LANES, Pack, Width};
 use crate::rod::{self, Damping};
 use crate::stage::{Air, Contact};
 use crate::{Body, Motion, Rigid, Vec3, Wind};
@@ -318,26 +319,6 @@ impl Settings {
     }
 }
 
-/// Natural shape, and equilibrium under gravity.
-struct Settle<'a> {
-    group: &'a mut Group,
-    weight: &'a [[Pack; 3]],
-    free: &'a [Pack],
-    sag_free: bool,
-}
-
-impl Kernel for Settle<'_> {
-    type Out = ();
-    #[inline(always)]
-    fn run<L: Lanes>(self) {
-        let g = self.group;
-        rod::relax::<L>(&mut g.node, &mut g.elastic, &g.motion);
-        if self.sag_free {
-            rod::stand::<L>(&mut g.node, &mut g.elastic, &g.motion, self.weight, self.free, &mut Vec::new());
-        }
-    }
-}
-
 impl Simulation {
     /// Prepares the hairs of a layer at rest under `gravity` (metres per second squared).
     ///
@@ -370,7 +351,7 @@ impl Simulation {
         }
         // Strands of like length share a group, so that little is padded.
         strands.sort_by_key(|s| s.point.len());
-        let prepare = |s: &[Strand]| prepare(s, settings, gravity);
+        let prepare = |s: &[Strand]| settle::prepare(s, settings, gravity);
         let (group, figures): (Vec<Group>, Vec<_>) = strands.par_chunks(LANES).map(prepare).unzip();
         let mut place = vec![None; hairs.offsets.len()];
         for (i, g) in group.iter().enumerate() {
@@ -385,10 +366,10 @@ impl Simulation {
             particles: pick.len() as u64,
             bytes: (nodes * (size_of::<crate::stage::Node>() + size_of::<crate::stage::Motion>())) as u64
                 + (nodes * size_of::<rod::Elastic>()) as u64,
-            stiffened: Vec::new(),
+            stiffened: figures.iter().flat_map(|f| &f.stiffened).map(|&(s, factor)| StiffenedStrand { id: hairs.id[s], factor }).collect(),
             rigid: rider.iter().map(|r| hairs.id[r.index]).collect(),
-            largest_hinge: figures.iter().map(|f| f.0).fold(0.0, f64::max),
-            largest_gamma: figures.iter().map(|f| f.1).fold(0.0, f64::max),
+            largest_hinge: figures.iter().map(|f| f.hinge).fold(0.0, f64::max),
+            largest_gamma: figures.iter().map(|f| f.gamma).fold(0.0, f64::max),
         };
         let offsets = Offsets::from_counts(counts);
         let id = hairs.id.to_vec();
@@ -578,39 +559,6 @@ fn sample(points: Vec<Vec3>, segments: Option<usize>) -> Vec<Vec3> {
         }
     }
     new
-}
-
-/// Packs a group and finds its natural shape; with it, the largest hinge angle and weight-to-stiffness ratio.
-fn prepare(strands: &[Strand], settings: &Settings, gravity: [f64; 3]) -> (Group, (f64, f64)) {
-    let mut group = Group::pack(strands, settings);
-    let n = group.node.len();
-    let mut weight = vec![[Pack::default(); 3]; n];
-    let mut free = vec![Pack::default(); n];
-    for (i, node) in group.node.iter().enumerate() {
-        for l in 0..LANES {
-            if group.strand[l].is_some() && node.held.0[l] == 0.0 {
-                free[i].0[l] = 1.0;
-                for c in 0..3 {
-                    weight[i][c].0[l] = node.mass.0[l] * gravity[c];
-                }
-            }
-        }
-    }
-    // Only a strand that is clamped at one end and free at the other is determinate.
-    let sag_free = settings.sag_free && settings.root == End::Clamped && settings.tip == End::Free;
-    let width = if settings.wide { Width::best() } else { Width::Plain };
-    lanes::run(width, Settle { group: &mut group, weight: &weight, free: &free, sag_free });
-    let section = Section::new(settings);
-    let g = Vec3::from(gravity).norm();
-    let (mut hinge, mut gamma) = (0.0f64, 0.0f64);
-    for s in strands {
-        let length: f64 = s.point.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
-        gamma = gamma.max(section.mass * g * length.powi(3) / section.bend);
-        for w in s.point.windows(3) {
-            hinge = hinge.max((w[1] - w[0]).angle(&(w[2] - w[1])));
-        }
-    }
-    (group, (hinge, gamma))
 }
 
 /// Moves a group through a span.

@@ -72,3 +72,56 @@ fn a_horizontal_rod_swings_as_it_should() {
         println!("   errors {error:?}");
     }
 }
+
+/// A hair of human thickness, its root at the origin.
+fn human(length: f64, direction: [f64; 3], curl: f64, segments: usize) -> Vec<[f64; 3]> {
+    (0..=segments)
+        .map(|i| {
+            let s = length * i as f64 / segments as f64;
+            let a = 60.0 * s;
+            let side = [curl * (libm::cos(a) - 1.0), curl * libm::sin(a)];
+            [direction[0] * s + side[0], direction[1] * s + side[1], direction[2] * s]
+        })
+        .collect()
+}
+
+#[test]
+fn a_groomed_pose_stays() {
+    for (length, direction, curl) in [
+        (0.1, [1.0, 0.0, 0.0], 0.0),
+        (0.2, [1.0, 0.0, 0.0], 0.0),
+        (0.3, [1.0, 0.0, 0.0], 0.0),
+        (0.2, [0.6, -0.8, 0.0], 0.004),
+        (0.2, [0.0, 1.0, 0.0], 0.0),
+        (0.05, [0.0, 1.0, 0.0], 0.0),
+    ] {
+        let points = human(length, direction, curl, 40);
+        let offsets = Offsets::uniform(1, points.len());
+        let settings = Settings {
+            material: Material { drag_factor: 0.0, ..Material::default() },
+            sleep: false,
+            ..Settings::default()
+        };
+        let g = [0.0, -9.81, 0.0];
+        let hairs = Hairs { offsets: &offsets, position: &points, id: &[1] };
+        let (mut sim, started) = Simulation::new(&hairs, &settings, g).unwrap();
+        let root = [Root { position: points[0], rotation: [0.0, 0.0, 0.0, 1.0] }];
+        let body = Body::default();
+        for k in 0..24 {
+            let span = Span {
+                seconds: 1.0 / 24.0,
+                time: f64::from(k) / 24.0,
+                motion: &still,
+                roots: [&root, &root],
+                tips: None,
+                body: &body,
+                gravity: [g, g],
+                wind: None,
+            };
+            sim.advance(&span, &|_| true).unwrap();
+        }
+        let p = sim.positions();
+        let drift = p.iter().zip(&points).map(|(a, b)| (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>().sqrt()).fold(0.0, f64::max);
+        println!("length {length} direction {direction:?} curl {curl}: drift {:.1e} L, gamma {:.1}, stiffened {:?}", drift / length, started.largest_gamma, started.stiffened);
+    }
+}
