@@ -6,7 +6,7 @@ pub mod body;
 pub mod simulation;
 pub mod wind;
 
-pub use body::{Body, Motion, Part, Rigid, Sample, Shape};
+pub use body::{Body, Hit, Motion, Part, Rigid, Shape};
 pub use simulation::{
     Hairs, Material, Model, Root, Settings, SimError, Simulation, Span, SpanReport, Started, StiffenedStrand,
 };
