@@ -14,7 +14,7 @@ pub mod simulation;
 pub mod stage;
 pub mod wind;
 
-pub use body::{Body, Motion, Part, Rigid, Sample, Shape};
+pub use body::{Body, Hit, Motion, Part, Rigid, Shape};
 pub use simulation::{
     End, Hairs, Material, Model, Root, Settings, SimError, Simulation, Span, SpanReport, Started, StiffenedStrand,
 };

@@ -5,7 +5,7 @@
 //! interpolation of the coarse corners beyond it, so that the field is continuous where bricks end: on a face towards a
 //! cell without a brick both sides are the same bilinear function.
 
-use super::Sample;
+use super::Hit;
 use crate::Vec3;
 use pelage_geom::{Bvh, Closest, NONE, SurfacePoint, Topology};
 use rayon::prelude::*;
@@ -46,6 +46,7 @@ pub struct Field {
     /// Vertices without a finite position; their triangles are left out.
     pub not_finite: usize,
     settings: FieldSettings,
+    per_voxel: f64,
     /// Box of the mesh.
     mesh: Bounds,
     /// Lowest corner of the lattice, and its highest.
@@ -138,7 +139,7 @@ impl Field {
 
     /// Trilinear distance, its unit gradient, and no velocity. Continuous. Beyond the lattice it is that of the surface
     /// point that is closest to the nearest point of the lattice.
-    pub fn sample(&self, p: Vec3) -> Sample {
+    pub fn sample(&self, p: Vec3) -> Hit {
         if self.cells[0] == 0 {
             return self.away(p);
         }
@@ -148,18 +149,18 @@ impl Field {
             return self.extrapolate(p, beyond);
         }
         let normal = gradient.try_normalize(1e-3).unwrap_or_else(|| self.coarse_normal(p));
-        Sample { distance, normal, velocity: Vec3::zeros() }
+        Hit { distance, normal, velocity: Vec3::zeros() }
     }
 
     /// Beyond the lattice: from the blended foot of its nearest point, and continuous there.
-    fn extrapolate(&self, p: Vec3, beyond: Vec3) -> Sample {
+    fn extrapolate(&self, p: Vec3, beyond: Vec3) -> Hit {
         let q = p - beyond;
         let (cell, f) = self.cell(q);
         let place = self.coarse(cell, f);
         let foot = Vec3::from(std::array::from_fn(|i| place.blend(|k| f64::from(self.corner_foot[k][i]))));
         let distance = self.value(&self.locate(q).0).0 + (p - foot).norm() - (q - foot).norm();
         let normal = (p - foot).try_normalize(1e-12).unwrap_or_else(Vec3::y);
-        Sample { distance, normal, velocity: Vec3::zeros() }
+        Hit { distance, normal, velocity: Vec3::zeros() }
     }
 
     /// A lower bound of the distance to the surface where `p` is outside; zero or less where it is inside.
@@ -169,7 +170,8 @@ impl Field {
             return far;
         }
         let q = self.clamp(p);
-        let (cell, f) = self.cell(q);
+        let (b, f) = self.cell(q);
+        let cell = self.index(b);
         let size = self.cell_size();
         let off = |side: f64, g: [f64; 3]| side * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]).sqrt();
         let mut bound = f64::from(self.centre[cell]) - off(size, f.map(|f| f - 0.5));
@@ -204,7 +206,7 @@ impl Field {
             |((value, &cell), foot)| {
                 for n in 0..SAMPLES {
                     if foot[n].triangle == NONE {
-                        let place = self.coarse(cell, split(n).map(|i| i as f64 / CELLS as f64));
+                        let place = self.coarse(self.cell_at(cell), split(n).map(|i| i as f64 / CELLS as f64));
                         value[n] = std::array::from_fn(|i| place.blend(|k| f64::from(corner[k][i])) as f32);
                     }
                 }
@@ -218,7 +220,7 @@ impl Field {
     pub(super) fn locate(&self, p: Vec3) -> (Place, Vec3) {
         let q = self.clamp(p);
         let (cell, f) = self.cell(q);
-        let brick = self.brick[cell];
+        let brick = self.brick[self.index(cell)];
         let place = if brick == NONE {
             self.coarse(cell, f)
         } else {
@@ -228,7 +230,7 @@ impl Field {
                 base: brick as usize + i[0] + SIDE * (i[1] + SIDE * i[2]),
                 stride: [SIDE, SIDE * SIDE],
                 t: std::array::from_fn(|k| g[k] - i[k] as f64),
-                scale: 1.0 / self.settings.voxel,
+                scale: self.per_voxel,
             }
         };
         (place, p - q)
@@ -250,10 +252,10 @@ impl Field {
     }
 
     /// Nothing but the mesh's box is known.
-    fn away(&self, p: Vec3) -> Sample {
+    fn away(&self, p: Vec3) -> Hit {
         let distance = box_distance(p, &self.mesh);
         let out = if distance.is_finite() { p - clamped(p, &self.mesh) } else { Vec3::y() };
-        Sample { distance, normal: out.try_normalize(1e-12).unwrap_or_else(Vec3::y), velocity: Vec3::zeros() }
+        Hit { distance, normal: out.try_normalize(1e-12).unwrap_or_else(Vec3::y), velocity: Vec3::zeros() }
     }
 
     /// Direction away from the surface by the coarse lattice; up where that knows none either.
@@ -277,12 +279,16 @@ impl Field {
     }
 
     /// Cell of a point of the lattice, and where in it, 0 to 1.
-    fn cell(&self, q: Vec3) -> (usize, [f64; 3]) {
-        let per = 1.0 / self.cell_size();
+    fn cell(&self, q: Vec3) -> ([usize; 3], [f64; 3]) {
+        let per = self.per_voxel * (1.0 / CELLS as f64);
         let u: [f64; 3] = std::array::from_fn(|i| (q[i] - self.domain.0[i]) * per);
-        let b: [usize; 3] = std::array::from_fn(|i| (u[i] as usize).min(self.cells[i] - 1));
-        let f = std::array::from_fn(|i| (u[i] - b[i] as f64).min(1.0));
-        (b[0] + self.cells[0] * (b[1] + self.cells[1] * b[2]), f)
+        let b: [usize; 3] = std::array::from_fn(|i| (u[i] as u32 as usize).min(self.cells[i] - 1));
+        (b, std::array::from_fn(|i| (u[i] - b[i] as u32 as f64).min(1.0)))
+    }
+
+    /// Number of a cell.
+    fn index(&self, b: [usize; 3]) -> usize {
+        b[0] + self.cells[0] * (b[1] + self.cells[1] * b[2])
     }
 
     /// Cell coordinates.
@@ -292,10 +298,9 @@ impl Field {
     }
 
     /// Place among a cell's corners.
-    fn coarse(&self, cell: usize, t: [f64; 3]) -> Place {
-        let b = self.cell_at(cell);
+    fn coarse(&self, b: [usize; 3], t: [f64; 3]) -> Place {
         let (sy, sz) = (self.cells[0] + 1, (self.cells[0] + 1) * (self.cells[1] + 1));
-        Place { base: b[0] + sy * b[1] + sz * b[2], stride: [sy, sz], t, scale: 1.0 / self.cell_size() }
+        Place { base: b[0] + sy * b[1] + sz * b[2], stride: [sy, sz], t, scale: self.per_voxel * (1.0 / CELLS as f64) }
     }
 
     /// Cells that have a brick, ascending, as the bricks are stored.
@@ -363,6 +368,7 @@ impl Field {
             self.settings.voxel *= 1.25;
         }
         self.cells = cells(self.settings.voxel).map(|n| n as usize);
+        self.per_voxel = 1.0 / self.settings.voxel;
         self.domain = (low, std::array::from_fn(|i| low[i] + self.cells[i] as f64 * self.cell_size()));
         true
     }
@@ -380,7 +386,7 @@ impl Field {
                 let corner = |i: usize| Vec3::from(low) + Vec3::new(i as f64, (row % ny) as f64, (row / ny) as f64) * size;
                 let at = |i: usize| {
                     let found = query(bvh, corner(i), limit);
-                    limit = found.signed_distance.abs() + size;
+                    limit = (corner(i + 1) - found.position).norm();
                     found
                 };
                 (0..nx).map(at).collect()
@@ -401,9 +407,9 @@ impl Field {
         let centres: Vec<f64> = (0..self.cells.iter().product())
             .into_par_iter()
             .map(|cell: usize| {
-                let near = f64::from(self.distance[self.coarse(cell, [0.0; 3]).base]);
-                query(bvh, self.corner_of(cell) + Vec3::repeat(0.5 * size), near.abs() * (1.0 + 1e-6) + radius)
-                    .signed_distance
+                let centre = self.corner_of(cell) + Vec3::repeat(0.5 * size);
+                let foot = self.corner_foot[self.coarse(self.cell_at(cell), [0.0; 3]).base].map(f64::from);
+                query(bvh, centre, (centre - Vec3::from(foot)).norm() * (1.0 + 1e-6)).signed_distance
             })
             .collect();
         self.centre = centres.iter().map(|&d| (d - d.abs() * 1e-6) as f32).collect();
@@ -439,16 +445,16 @@ impl Field {
     fn sample_brick(&self, bvh: &Bvh, cell: usize) -> ([f32; SAMPLES], [SurfacePoint; SAMPLES]) {
         let nowhere = SurfacePoint { triangle: NONE, bary: [0.0; 2] };
         let (mut distance, mut foot) = ([0.0; SAMPLES], [nowhere; SAMPLES]);
-        let (corner, voxel) = (self.corner_of(cell), self.settings.voxel);
+        let (corner, voxel, at) = (self.corner_of(cell), self.settings.voxel, self.cell_at(cell));
         let own = self.owned(cell);
         let mut sign = f64::from(self.centre[cell]);
-        // At least and at most this far from the surface.
-        let half = 0.5 * 3f64.sqrt() * self.cell_size();
-        let (mut least, mut most) = (sign.abs() * (1.0 - 1e-5) - half, sign.abs() * (1.0 + 1e-5) + half);
+        // At least this far from the surface, and a point of that.
+        let mut least = sign.abs() * (1.0 - 1e-5) - 0.5 * 3f64.sqrt() * self.cell_size();
+        let mut last = Vec3::from(self.corner_foot[self.coarse(at, [0.0; 3]).base].map(f64::from));
         for step in 0..own.iter().product() {
             let [i, j, k] = to_and_fro(step, own);
             let n = i + SIDE * (j + SIDE * k);
-            let coarse = self.coarse(cell, [i, j, k].map(|i| i as f64 / CELLS as f64));
+            let coarse = self.coarse(at, [i, j, k].map(|i| i as f64 / CELLS as f64));
             let coarse = coarse.blend(|k| f64::from(self.distance[k]));
             let (band, blend) = (self.width(sign), BLEND * voxel);
             let clear = |d: f64| sign.signum() * (d * sign.signum()).max(self.width(sign));
@@ -456,8 +462,9 @@ impl Field {
                 distance[n] = clear(coarse) as f32;
             } else {
                 let p = corner + Vec3::new(i as f64, j as f64, k as f64) * voxel;
-                let Closest { signed_distance: d, point, .. } = query(bvh, p, most);
-                (sign, least, most, foot[n]) = (d, d.abs(), d.abs(), point);
+                let found = query(bvh, p, (p - last).norm() * (1.0 + 1e-6));
+                let d = found.signed_distance;
+                (sign, least, last, foot[n]) = (d, d.abs(), found.position, found.point);
                 let t = ((d.abs() - self.width(d)) / blend).clamp(0.0, 1.0);
                 let clear = |x: f64| d.signum() * (x * d.signum()).max(self.width(d));
                 distance[n] = if t > 0.0 { clear(d + t * (coarse - d)) } else { d } as f32;
@@ -466,7 +473,6 @@ impl Field {
                 }
             }
             least -= voxel;
-            most += voxel;
         }
         (distance, foot)
     }
@@ -479,7 +485,6 @@ impl Field {
 
     /// Fills the faces that the next cells own: from their bricks, or from the coarse corners where they have none.
     fn join_bricks(&mut self, active: &[usize]) {
-        let [nx, ny, _] = self.cells;
         let faces: Vec<Vec<(u32, f32, SurfacePoint)>> = active
             .par_iter()
             .map(|&cell| {
@@ -492,9 +497,9 @@ impl Field {
                     }
                     let next: [usize; 3] = std::array::from_fn(|a| b[a] + usize::from(i[a] >= own[a]));
                     let local: [usize; 3] = std::array::from_fn(|a| if i[a] >= own[a] { 0 } else { i[a] });
-                    let brick = self.brick[next[0] + nx * (next[1] + ny * next[2])];
+                    let brick = self.brick[self.index(next)];
                     face.push(if brick == NONE {
-                        let place = self.coarse(cell, i.map(|i| i as f64 / CELLS as f64));
+                        let place = self.coarse(b, i.map(|i| i as f64 / CELLS as f64));
                         let d = place.blend(|k| f64::from(self.distance[k]));
                         (n as u32, d as f32, SurfacePoint { triangle: NONE, bary: [0.0; 2] })
                     } else {
@@ -529,7 +534,7 @@ fn to_and_fro(n: usize, size: [usize; 3]) -> [usize; 3] {
 
 /// Closest point; `limit`: an upper bound of the distance but for rounding.
 fn query(bvh: &Bvh, p: Vec3, limit: f64) -> Closest {
-    let found = bvh.closest(p, limit * (1.0 + 1e-9) + 1e-300).or_else(|| bvh.closest(p, f64::INFINITY));
+    let found = bvh.closest(p, limit * (1.0 + 1e-9) + 1e-12).or_else(|| bvh.closest(p, f64::INFINITY));
     let point = SurfacePoint { triangle: NONE, bary: [0.0; 2] };
     found.unwrap_or(Closest { point, position: p, signed_distance: f64::MAX, normal: Vec3::y() })
 }

@@ -268,3 +268,28 @@ fn timing() {
         println!("{name} {} sample {} ns bound {} ns closest {tq} ns {s}", pts.len(), t * 1e6 / (rep * pts.len()) as f64, tb * 1e6 / (rep * pts.len()) as f64);
     }
 }
+#[test]
+fn timing2() {
+    let mesh = metres(bust().mesh);
+    let (f, bvh) = with(&mesh, &FINE, None);
+    let cells = f.cells_with_bricks();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let sched = || std::fs::read_to_string("/proc/thread-self/schedstat").unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
+    let t = sched();
+    let mut n = 0usize;
+    for &c in &cells { let (d, foot) = f.sample_brick(&bvh, c); n += foot.iter().filter(|f| f.triangle != NONE).count(); std::hint::black_box(d); }
+    println!("bricks {} ms, {n} feet, {} ns", (sched() - t) / 1e6, (sched() - t) / n as f64);
+    let t = sched();
+    let mut s = 0.0;
+    let mut n = 0;
+    for d in [0.001, 0.005, 0.01, 0.02, 0.028] {
+        let t = sched();
+        for (k, p) in mesh.position.iter().enumerate().take(9000).step_by(3) {
+            let p = Vec3::from(*p) + random_in(k as u64, [-1.0; 3], [1.0; 3]).normalize() * d;
+            let c = bvh.closest(p, d).map_or(0.0, |c| c.signed_distance);
+            s += c; n += 1;
+        }
+        println!("{d}: {} ns", (sched() - t) / 3000.0);
+    }
+    let _ = (t, n, s, pool);
+}
