@@ -71,7 +71,6 @@ fn is_free(g: &Group, i: usize, l: usize) -> bool {
 /// Finds the contacts of some lanes at the nodes' present positions; false if there are none.
 pub fn find(
     g: &Group,
-    keep: &mut Keep,
     body: &Instant<'_, '_>,
     lanes: [bool; LANES],
     h: f64,
@@ -87,7 +86,7 @@ pub fn find(
             }
             let p = g.x(i, l);
             let travel = g.v(i, l).norm() * h;
-            let reach = keep.now[i].0[l].max(0.0) + NEAR + 0.5 * travel;
+            let reach = g.keep.now[i].0[l].max(0.0) + NEAR + 0.5 * travel;
             if body.distance_bound(p) > reach {
                 c.force.0[l] = 0.0;
                 continue;
@@ -98,7 +97,7 @@ pub fn find(
                 continue;
             }
             any = true;
-            let level = hit.normal.dot(&p) - hit.distance + keep.now[i].0[l];
+            let level = hit.normal.dot(&p) - hit.distance + g.keep.now[i].0[l];
             for k in 0..3 {
                 c.normal[k].0[l] = hit.normal[k];
                 c.velocity[k].0[l] = hit.velocity[k];
@@ -112,7 +111,7 @@ pub fn find(
 
 /// After a step: no bounce (the relative normal velocity of touching points is 0, not outward), and points that are
 /// still inside may stay there for now.
-pub fn settle(g: &mut Group, keep: &mut Keep, contact: &[Contact], lanes: [bool; LANES]) {
+pub fn settle(g: &mut Group, contact: &[Contact], lanes: [bool; LANES]) {
     for i in 0..g.node.len() {
         for l in 0..LANES {
             let c = &contact[i];
@@ -123,7 +122,7 @@ pub fn settle(g: &mut Group, keep: &mut Keep, contact: &[Contact], lanes: [bool;
             let surface = Vec3::new(c.velocity[0].0[l], c.velocity[1].0[l], c.velocity[2].0[l]);
             let depth = c.level.0[l] - n.dot(&g.x(i, l));
             if depth > 0.0 {
-                keep.now[i].0[l] -= depth;
+                g.keep.now[i].0[l] -= depth;
             }
             let away = n.dot(&(g.v(i, l) - surface));
             if away > 0.0 {
@@ -138,7 +137,7 @@ pub fn settle(g: &mut Group, keep: &mut Keep, contact: &[Contact], lanes: [bool;
 
 /// At the end of a span: points that the exact mesh has inside come out to its surface, but not those that are on their
 /// way out. Returns how many were moved, and how deep the deepest was that stays.
-pub fn correct(g: &mut Group, keep: &Keep, body: &Instant<'_, '_>) -> (u64, f64) {
+pub fn correct(g: &mut Group, body: &Instant<'_, '_>) -> (u64, f64) {
     let (mut moved, mut deepest) = (0, 0.0f64);
     for i in 0..g.node.len() {
         for l in 0..LANES {
@@ -147,7 +146,7 @@ pub fn correct(g: &mut Group, keep: &Keep, body: &Instant<'_, '_>) -> (u64, f64)
             }
             let p = g.x(i, l);
             let Some(hit) = body.exact(p, 0.0) else { continue };
-            if keep.now[i].0[l] < -VISIBLE {
+            if g.keep.now[i].0[l] < -VISIBLE {
                 deepest = deepest.max(-hit.distance);
                 continue;
             }

@@ -1,6 +1,7 @@
 //! Eight strands packed lane by lane, with their model and state.
 
 use crate::band::HELD;
+use crate::contact::Keep;
 use crate::lanes::{LANES, Pack};
 use crate::rod::Elastic;
 use crate::simulation::{End, Settings};
@@ -35,6 +36,8 @@ pub struct Group {
     pub quiet: [u32; LANES],
     /// Nodes before a strand's first point: 1 if its root is clamped.
     pub before: usize,
+    /// How close to the body its points come; empty before the first span.
+    pub keep: Keep,
     /// First point, root direction's neighbour and frame at rest, per lane: what a clamp carries.
     pub clamp: [[Clamp; 2]; LANES],
 }
@@ -116,6 +119,7 @@ impl Group {
             level: [0; LANES],
             quiet: [0; LANES],
             before,
+            keep: Keep::default(),
             clamp: [[Clamp::default(); 2]; LANES],
         };
         for lane in 0..LANES {
@@ -232,15 +236,23 @@ impl Group {
         for i in 0..self.count[lane] {
             let x = to.apply(from.invert(self.x(i, lane)));
             let m = &mut self.motion[i];
-            for (field, moved) in [(&mut m.v, true), (&mut m.a, true), (&mut m.m, true)] {
-                let old = Vec3::new(field[0].0[lane], field[1].0[lane], field[2].0[lane]);
-                let new = if moved { turn * old } else { old };
+            for field in [&mut m.v, &mut m.a, &mut m.m] {
+                let new = turn * Vec3::new(field[0].0[lane], field[1].0[lane], field[2].0[lane]);
                 for c in 0..3 {
                     field[c].0[lane] = new[c];
                 }
             }
             for c in 0..3 {
                 m.x[c].0[lane] = x[c];
+            }
+        }
+    }
+
+    /// Stops a strand.
+    pub fn stop(&mut self, lane: usize) {
+        for m in &mut self.motion[..self.count[lane]] {
+            for p in m.v.iter_mut().chain(&mut m.a) {
+                p.0[lane] = 0.0;
             }
         }
     }

@@ -8,6 +8,7 @@
 //! alone, so no hair changes another.
 
 use crate::band::HELD;
+use crate::contact;
 use crate::group::{Group, mask};
 use crate::lanes::{self, Kernel, L3, LANES, Lanes, Pack, Width, load3, mul_add3, scale3, store3, sub3};
 use crate::rod::{self, Damping, Scratch, Watch};
@@ -21,6 +22,10 @@ pub const DEEPEST: u8 = 6;
 
 /// Iterations of a stage before its step is halved.
 const ITERATIONS: usize = 8;
+
+/// What is left of an iteration's turn when contact comes and goes, radians. Above 0.05, hair that is pressed on a corner
+/// shows it; below 1e-3, strands halve their steps for nothing.
+const CONTACT_TOLERANCE: f64 = 1e-2;
 
 /// Buffers of a thread.
 #[derive(Debug, Default)]
@@ -62,10 +67,12 @@ pub trait Around {
     fn hold(&self, group: &mut Group, lanes: [bool; LANES], fraction: f64);
     /// Gravity at a fraction of the span, metres per second squared.
     fn gravity(&self, fraction: f64) -> [f64; 3];
+    /// Whether there is a body.
+    fn solid(&self) -> bool;
     /// Fills in contacts at the nodes' present positions; false if there are none.
     fn touch(&self, group: &Group, lanes: [bool; LANES], fraction: f64, h: f64, contact: &mut [Contact]) -> bool;
-    /// Fills in the air at the nodes; false if it does not act.
-    fn air(&self, group: &Group, fraction: f64, air: &mut [Air]) -> bool;
+    /// Fills in the air at the nodes of some lanes; false if it does not act.
+    fn air(&self, group: &Group, lanes: [bool; LANES], fraction: f64, air: &mut [Air]) -> bool;
 }
 
 /// What a group did.
@@ -179,8 +186,9 @@ fn step<A: Around>(
     work.twisting.reserve(n);
     work.straight.reserve(n);
     let h = GAMMA * dt;
-    let mut converged = lanes;
+    let (mut converged, mut touched) = (lanes, false);
     let start = held_positions(g);
+    let blowing = around.air(g, lanes, at.start, &mut work.air);
     for (second, fraction, since) in
         [(false, at.start + GAMMA * at.length, h), (true, at.start + at.length, dt - h)]
     {
@@ -190,13 +198,19 @@ fn step<A: Around>(
         lanes::run(method.width, Predict { motion: &mut g.motion, y, base, from, h, rest, gravity, second });
         around.hold(g, lanes, fraction);
         prescribe(g, work, &start, h, (fraction - at.start) * at.span);
-        let stage_ok = solve(g, around, method, fraction, h, since, lanes, work, done);
+        let touching = around.solid() && around.touch(g, lanes, fraction, h, &mut work.contact);
+        let acting = Acting { h, since, touching, blowing };
+        let stage_ok = solve(g, method, acting, lanes, work, done);
+        touched |= touching;
         for l in 0..LANES {
             converged[l] &= stage_ok[l];
         }
     }
     let Work { base, from, .. } = work;
     lanes::run(method.width, Finish { motion: &mut g.motion, base, from, h });
+    if touched {
+        contact::settle(g, &work.contact, lanes);
+    }
     let count: usize = (0..LANES).filter(|&l| lanes[l]).map(|l| g.count[l]).sum();
     done.node_steps += count as u64;
     converged
@@ -229,24 +243,29 @@ fn prescribe(g: &Group, work: &mut Work, start: &[[Pack; 3]], h: f64, elapsed: f
     }
 }
 
-/// Iterates a stage to its tolerance.
-#[allow(clippy::too_many_arguments)]
-fn solve<A: Around>(
-    g: &mut Group,
-    around: &A,
-    method: &Method,
-    fraction: f64,
+/// What acts in a stage.
+#[derive(Clone, Copy)]
+struct Acting {
     h: f64,
     since: f64,
+    touching: bool,
+    blowing: bool,
+}
+
+/// Iterates a stage to its tolerance; returns the lanes that reached it.
+fn solve(
+    g: &mut Group,
+    method: &Method,
+    acting: Acting,
     lanes: [bool; LANES],
     work: &mut Work,
     done: &mut Done,
 ) -> [bool; LANES] {
-    let touching = around.touch(g, lanes, fraction, h, &mut work.contact);
-    let blowing = around.air(g, fraction, &mut work.air);
+    let Acting { h, since, touching, blowing } = acting;
     work.turned.fill(Pack::default());
     let mut active = lanes;
     let limit = method.tolerance * method.tolerance;
+    let mut last = Pack::default();
     for iteration in 0..ITERATIONS {
         let stage = Stage {
             h,
@@ -265,6 +284,7 @@ fn solve<A: Around>(
             let scratch = &mut work.straight;
             lanes::run(method.width, Iterate { g, turned: &mut work.turned, damping: method.damping, stage, scratch })
         };
+        last = largest;
         for l in 0..LANES {
             if active[l] {
                 done.node_solves += g.count[l] as u64;
@@ -275,7 +295,8 @@ fn solve<A: Around>(
             break;
         }
     }
-    std::array::from_fn(|l| !active[l])
+    // Points that come and go at the body may swing around the tolerance: close is enough there.
+    std::array::from_fn(|l| !active[l] || (touching && last.0[l] < CONTACT_TOLERANCE * CONTACT_TOLERANCE))
 }
 
 /// One iteration of a rod.

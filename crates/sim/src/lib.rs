@@ -4,6 +4,7 @@
 
 pub mod band;
 pub mod body;
+pub mod contact;
 pub mod drag;
 pub mod group;
 pub mod integrate;

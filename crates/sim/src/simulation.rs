@@ -1,11 +1,14 @@
 //! A layer of hair in motion: the constant model, the changing state, and the step over a span of time.
 
+use crate::contact::{self, Keep};
+use crate::drag;
 use crate::group::{Group, Strand};
 use crate::settle;
 use crate::integrate::{self, Around, Done, Interval, Method, Work};
 use crate::lanes::{LANES, Pack, Width};
 use crate::rod::{self, Damping};
 use crate::stage::{Air, Contact};
+use crate::wind::Surface;
 use crate::{Body, Motion, Rigid, Vec3, Wind};
 use pelage_geom::{Offsets, StrandId};
 use rayon::prelude::*;
@@ -216,8 +219,10 @@ pub struct SpanReport {
     pub subdivided: u64,
     /// Strands that slept.
     pub sleeping: u64,
-    /// Points touching the body at the end.
-    pub contacts: u64,
+    /// Points that the exact mesh pushed out at the end.
+    pub corrected: u64,
+    /// Depth of the deepest point that is on its way out of the body, metres.
+    pub deepest: f64,
     /// Strands carried over a jump of their root.
     pub teleported: u64,
     /// Strands that diverged and were held for this span.
@@ -283,6 +288,13 @@ const SHORTEST: f64 = 1e-9;
 
 /// Steps a second without motion of the body. Fewer and hair that swings freely takes steps of its own; more cost time.
 const STEPS_PER_SECOND: f64 = 192.0;
+
+/// Points between samples of the wind along a hair. One is exact and costs most of the step; the wind is smooth over many.
+const WIND_STRIDE: usize = 4;
+
+/// A strand that moves slower than this over two spans, with nothing around it moving, sleeps, metres per second. What it
+/// would still have moved is less than this times its longest period (about 1 s): a micrometre.
+const SLEEP_SPEED: f64 = 1e-6;
 
 /// Farthest that the skin turns in a step, radians.
 const STEP_TURN: f64 = 0.1;
@@ -404,12 +416,12 @@ impl Simulation {
         };
         let count = self.group.len();
         let (finished, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
-        let scene = Scene { span, settings: &self.settings, last: &self.root };
-        let done: Vec<Done> = self
+        let scene = Scene { span, settings: &self.settings, last: &self.root, calm: is_calm(span) };
+        let done: Vec<Moved> = self
             .group
             .par_iter_mut()
             .map_init(Work::default, |work, g| {
-                let mut done = Done::default();
+                let mut done = Moved::default();
                 if !stopped.load(Ordering::Relaxed) {
                     move_group(g, &scene, &method, steps, work, &mut done);
                     let k = finished.fetch_add(1, Ordering::Relaxed) + 1;
@@ -425,6 +437,11 @@ impl Simulation {
         }
         let mut report = SpanReport { steps, shortest_step: span.seconds / f64::from(steps), ..SpanReport::default() };
         for (g, d) in self.group.iter().zip(&done) {
+            report.corrected += d.corrected;
+            report.deepest = report.deepest.max(d.deepest);
+            report.teleported += count_true(d.teleported);
+            report.sleeping += count_true(d.asleep);
+            let d = &d.done;
             report.particle_steps += d.node_steps;
             report.particle_solves += d.node_solves;
             for l in 0..LANES {
@@ -507,8 +524,11 @@ impl Simulation {
             if let Some((g, l)) = place {
                 let (g, l) = (&self.group[*g as usize], *l as usize);
                 out.extend([f64::from(g.level[l]), f64::from(g.quiet[l])]);
-                for m in &g.motion[..g.count[l]] {
+                for (i, m) in g.motion[..g.count[l]].iter().enumerate() {
                     out.extend([&m.x, &m.v, &m.a, &m.m].into_iter().flatten().map(|p| p.0[l]));
+                    // Not a number before the first span.
+                    let keep = |p: &[Pack]| p.get(i).map_or(f64::NAN, |p| p.0[l]);
+                    out.extend([keep(&g.keep.most), keep(&g.keep.now)]);
                 }
             }
         }
@@ -519,7 +539,7 @@ impl Simulation {
     pub fn restore(&mut self, state: &[u8]) -> Result<(), SimError> {
         let values: Vec<f64> = state.chunks_exact(8).map(bytemuck::pod_read_unaligned).collect();
         let size = |p: &Option<(u32, u8)>| {
-            7 + p.map_or(0, |(g, l)| 2 + 12 * self.group[g as usize].count[l as usize])
+            7 + p.map_or(0, |(g, l)| 2 + 14 * self.group[g as usize].count[l as usize])
         };
         if state.len() != 8 * self.place.iter().map(size).sum::<usize>() {
             return Err(SimError::State("its length differs"));
@@ -534,9 +554,20 @@ impl Simulation {
                 let (g, l) = (&mut self.group[*g as usize], *l as usize);
                 g.level[l] = next() as u8;
                 g.quiet[l] = next() as u32;
-                for m in &mut g.motion[..g.count[l]] {
+                for i in 0..g.count[l] {
+                    let m = &mut g.motion[i];
                     for p in [&mut m.x, &mut m.v, &mut m.a, &mut m.m].into_iter().flatten() {
                         p.0[l] = next();
+                    }
+                    let (most, now) = (next(), next());
+                    if most.is_nan() {
+                        g.keep = Keep::default();
+                    } else {
+                        let n = g.node.len();
+                        for (keep, value) in [(&mut g.keep.most, most), (&mut g.keep.now, now)] {
+                            keep.resize(n, Pack::default());
+                            keep[i].0[l] = value;
+                        }
                     }
                 }
             }
@@ -562,13 +593,62 @@ fn sample(points: Vec<Vec3>, segments: Option<usize>) -> Vec<Vec3> {
 }
 
 /// Moves a group through a span.
-fn move_group(g: &mut Group, scene: &Scene<'_>, method: &Method, steps: u32, work: &mut Work, done: &mut Done) {
-    let lanes: [bool; LANES] = std::array::from_fn(|l| g.strand[l].is_some());
+fn move_group(g: &mut Group, scene: &Scene<'_>, method: &Method, steps: u32, work: &mut Work, done: &mut Moved) {
+    let saved = g.motion.clone();
+    if g.keep.most.is_empty() {
+        g.keep = Keep::new(g, &scene.span.body.at(0.0), scene.settings.offset);
+    }
+    let mut lanes = [false; LANES];
+    for l in 0..LANES {
+        let Some(s) = g.strand[l] else { continue };
+        let (from, to) = (scene.root(s, 0.0), scene.root(s, 1.0));
+        let jump = (Vec3::from(to.translation) - Vec3::from(from.translation)).norm();
+        if jump > scene.settings.teleport {
+            done.teleported[l] = true;
+            g.carry(l, &from, &to);
+        } else if scene.calm && scene.settings.sleep && g.quiet[l] >= 2 && from == to {
+            done.asleep[l] = true;
+        } else {
+            lanes[l] = true;
+        }
+    }
     for k in 0..steps {
         let length = 1.0 / f64::from(steps);
         let at = Interval { start: f64::from(k) * length, length, span: scene.span.seconds };
-        integrate::advance(g, scene, method, at, lanes, 0, work, done);
+        integrate::advance(g, scene, method, at, lanes, 0, work, &mut done.done);
+        if scene.solid() {
+            g.keep.release(length * scene.span.seconds);
+        }
     }
+    for l in 0..LANES {
+        let Some(s) = g.strand[l] else { continue };
+        if done.done.failed[l] {
+            // Held: it rides with its root for this span, and starts again from rest.
+            g.revert(l, &saved);
+            g.carry(l, &scene.root(s, 0.0), &scene.root(s, 1.0));
+            g.stop(l);
+        }
+        if lanes[l] {
+            let still = scene.calm && done.done.speed[l] < SLEEP_SPEED;
+            g.quiet[l] = if still { g.quiet[l] + 1 } else { 0 };
+            if g.quiet[l] >= 2 && scene.settings.sleep {
+                g.stop(l);
+            }
+        }
+    }
+    if scene.solid() && lanes.contains(&true) {
+        (done.corrected, done.deepest) = contact::correct(g, &scene.span.body.at(1.0));
+    }
+}
+
+/// What a group did in a span.
+#[derive(Clone, Copy, Debug, Default)]
+struct Moved {
+    done: Done,
+    teleported: [bool; LANES],
+    asleep: [bool; LANES],
+    corrected: u64,
+    deepest: f64,
 }
 
 /// A span as the integrator sees it.
@@ -576,6 +656,20 @@ struct Scene<'a> {
     span: &'a Span<'a>,
     settings: &'a Settings,
     last: &'a [Rigid],
+    /// Nothing around the hair moves in this span: neither skin, nor body, gravity, or wind.
+    calm: bool,
+}
+
+fn count_true(lanes: [bool; LANES]) -> u64 {
+    lanes.iter().filter(|&&b| b).count() as u64
+}
+
+/// Whether nothing around the hair moves in a span.
+fn is_calm(span: &Span<'_>) -> bool {
+    let rests = |m: Motion<'_>| m(0.0) == m(0.5) && m(0.0) == m(1.0);
+    let part = |p: &crate::Part<'_>| rests(p.motion) && !matches!(p.shape, crate::Shape::Deforming(_));
+    let [a, b] = span.gravity;
+    span.wind.is_none() && a == b && rests(span.motion) && span.body.parts.iter().all(part)
 }
 
 fn is_finite(r: &Root) -> bool {
@@ -653,11 +747,57 @@ impl Around for Scene<'_> {
         std::array::from_fn(|c| (1.0 - fraction) * a[c] + fraction * b[c])
     }
 
-    fn touch(&self, _: &Group, _: [bool; LANES], _: f64, _: f64, _: &mut [Contact]) -> bool {
-        false
+    fn solid(&self) -> bool {
+        !self.span.body.parts.is_empty()
     }
 
-    fn air(&self, _: &Group, _: f64, _: &mut [Air]) -> bool {
-        false
+    fn touch(&self, g: &Group, lanes: [bool; LANES], fraction: f64, h: f64, contact: &mut [Contact]) -> bool {
+        contact::find(g, &self.span.body.at(fraction), lanes, h, contact)
+    }
+
+    fn air(&self, g: &Group, lanes: [bool; LANES], fraction: f64, air: &mut [Air]) -> bool {
+        let factor = self.settings.material.drag_factor;
+        if factor == 0.0 {
+            return false;
+        }
+        let time = self.span.time + fraction * self.span.seconds;
+        let still = drag::Air::default();
+        let mut point: Vec<Vec3> = Vec::new();
+        let mut blowing = vec![Vec3::zeros(); g.node.len()];
+        for l in (0..LANES).filter(|&l| lanes[l] && g.strand[l].is_some()) {
+            let n = g.count[l];
+            if let Some(wind) = self.span.wind {
+                point.clear();
+                point.extend((0..n).map(|i| g.x(i, l)));
+                wind.free_along(&point, WIND_STRIDE, time, &mut blowing[..n]);
+                if wind.boundary > 0.0 && self.solid() {
+                    let body = self.span.body.at(fraction);
+                    for (i, p) in point.iter().enumerate() {
+                        if body.distance_bound(*p) < wind.boundary {
+                            let hit = body.sample(*p);
+                            let surface =
+                                Surface { distance: hit.distance, normal: hit.normal, velocity: hit.velocity };
+                            blowing[i] = crate::wind::beside(blowing[i], &surface, wind.boundary);
+                        }
+                    }
+                }
+            }
+            let length: f64 = (0..n).map(|i| g.node[i].share.0[l]).sum();
+            for i in 0..n {
+                let share = g.node[i].share.0[l];
+                let e = g.x((i + 1).min(n - 1), l) - g.x(i.saturating_sub(1), l);
+                let t = e.try_normalize(SHORTEST).unwrap_or(Vec3::zeros());
+                let u = g.v(i, l) - blowing[i];
+                let along = t.dot(&u);
+                let across = (u - t * along).norm();
+                let d = drag::drag(&still, self.settings.material.diameter, length, across, along.abs());
+                for c in 0..3 {
+                    air[i].velocity[c].0[l] = blowing[i][c];
+                }
+                air[i].across.0[l] = d.across * share * factor;
+                air[i].along.0[l] = d.along * share * factor;
+            }
+        }
+        true
     }
 }
