@@ -27,6 +27,16 @@ const ITERATIONS: usize = 8;
 /// shows it; below 1e-3, strands halve their steps for nothing.
 const CONTACT_TOLERANCE: f64 = 1e-2;
 
+/// Iterations in which friction follows. With one, hair sticks and slips a stage late; with many, some never settle.
+const FRICTION_ITERATIONS: usize = 2;
+
+/// The first iteration counts as well converged if it turns less than this times the tolerance's root, radians: what the
+/// guess from the last acceleration leaves. Larger, errors of fast motion stay; smaller, calm hair iterates twice.
+const FIRST_TURN: f64 = 0.05;
+
+/// Slowest convergence that is believed.
+const SLOWEST: f64 = 0.9;
+
 /// Buffers of a thread.
 #[derive(Debug, Default)]
 pub struct Work {
@@ -86,6 +96,8 @@ pub struct Done {
     pub deepest: [u8; LANES],
     /// Lanes that diverged.
     pub failed: [bool; LANES],
+    /// Steps after which a strand's strain was limited.
+    pub limited: u64,
     /// Largest strain at the end of a step, per lane.
     pub strain: [f64; LANES],
     /// Largest speed at the end, per lane.
@@ -127,6 +139,11 @@ pub fn advance<A: Around>(
             if now[l] && (calm || (depth == DEEPEST && finite)) {
                 done.deepest[l] = done.deepest[l].max(depth);
                 done.strain[l] = seen.strain.0[l];
+                if seen.strain.0[l] > method.strain_limit {
+                    limit_strain(g, l, method.strain_limit, at.length * at.span);
+                    done.strain[l] = method.strain_limit;
+                    done.limited += 1;
+                }
                 done.speed[l] = seen.speed.0[l].sqrt();
                 // Half the turn would have been fine with twice the step.
                 if depth > 0 && seen.turn.0[l] < 0.16 * method.largest_turn * method.largest_turn {
@@ -150,6 +167,28 @@ pub fn advance<A: Around>(
         let half = 0.5 * at.length;
         for start in [at.start, at.start + half] {
             advance(g, around, method, Interval { start, length: half, ..at }, deeper, depth + 1, work, done);
+        }
+    }
+}
+
+/// Strain limiting from root to tip (the springs paper's section 4.2): only the node farther from the root moves, along the
+/// edge, and its velocity with it.
+fn limit_strain(g: &mut Group, l: usize, limit: f64, dt: f64) {
+    for i in 0..g.count[l] - 1 {
+        if g.elastic[i].stretch.0[l] == 0.0 || g.node[i + 1].held.0[l] != 0.0 {
+            continue;
+        }
+        let rest = g.node[i].length.0[l];
+        let from = g.x(i, l);
+        let e = g.x(i + 1, l) - from;
+        let length = e.norm();
+        let wanted = length.clamp(rest * (1.0 - limit), rest * (1.0 + limit));
+        if wanted != length {
+            let by = e * ((wanted - length) / length);
+            for c in 0..3 {
+                g.motion[i + 1].x[c].0[l] += by[c];
+                g.motion[i + 1].v[c].0[l] += by[c] / dt;
+            }
         }
     }
 }
@@ -264,8 +303,7 @@ fn solve(
     let Acting { h, since, touching, blowing } = acting;
     work.turned.fill(Pack::default());
     let mut active = lanes;
-    let limit = method.tolerance * method.tolerance;
-    let mut last = Pack::default();
+    let mut last = Pack::splat(FIRST_TURN);
     for iteration in 0..ITERATIONS {
         let stage = Stage {
             h,
@@ -274,6 +312,7 @@ fn solve(
             base: &work.base,
             contact: touching.then_some(&mut work.contact),
             friction: method.friction,
+            refresh: iteration < FRICTION_ITERATIONS,
             air: blowing.then_some(&work.air),
             active: mask(active),
         };
@@ -284,11 +323,14 @@ fn solve(
             let scratch = &mut work.straight;
             lanes::run(method.width, Iterate { g, turned: &mut work.turned, damping: method.damping, stage, scratch })
         };
-        last = largest;
         for l in 0..LANES {
             if active[l] {
                 done.node_solves += g.count[l] as u64;
-                active[l] = largest.0[l] > limit || (touching && iteration == 0);
+                let turn = largest.0[l].sqrt();
+                let ratio = (turn / last.0[l]).min(SLOWEST);
+                // What later iterations would still turn, if each turned by the same fraction of the one before.
+                active[l] = turn * ratio > method.tolerance * (1.0 - ratio) || (touching && iteration == 0);
+                last.0[l] = turn;
             }
         }
         if !active.contains(&true) {
@@ -296,7 +338,7 @@ fn solve(
         }
     }
     // Points that come and go at the body may swing around the tolerance: close is enough there.
-    std::array::from_fn(|l| !active[l] || (touching && last.0[l] < CONTACT_TOLERANCE * CONTACT_TOLERANCE))
+    std::array::from_fn(|l| !active[l] || (touching && last.0[l] < CONTACT_TOLERANCE))
 }
 
 /// One iteration of a rod.

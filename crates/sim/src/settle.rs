@@ -210,6 +210,7 @@ impl Kernel for Gradient<'_> {
             base: self.still,
             contact: None,
             friction: 0.0,
+            refresh: false,
             air: None,
             active: Pack::splat(1.0),
         };

@@ -56,6 +56,8 @@ pub struct Contact {
     pub velocity: [Pack; 3],
     /// Normal force of the last iteration, newtons.
     pub force: Pack,
+    /// Friction as a viscous drag, newton second per metre.
+    pub drag: Pack,
 }
 
 /// The air at a node.
@@ -83,6 +85,9 @@ pub struct Stage<'a> {
     pub contact: Option<&'a mut [Contact]>,
     /// Friction coefficient.
     pub friction: f64,
+    /// Whether friction follows the last iteration's normal force and sliding; else it stays as it was, so that later
+    /// iterations converge.
+    pub refresh: bool,
     /// Air, if it acts.
     pub air: Option<&'a [Air]>,
     /// Lanes that still move: 1 or 0.
@@ -141,7 +146,10 @@ pub fn open_node<L: Lanes, const D: usize, const ROWS: usize>(
         let slide = crate::lanes::neg_mul_add3(n, dot(n, relative), relative);
         let speed = dot(slide, slide).sqrt().max(L::splat(STICK_SPEED));
         // The force of the last iteration sets the friction, so that the matrix stays symmetric.
-        let drag = L::splat(stage.friction) * L::load(&contact.force) / speed;
+        if stage.refresh {
+            (L::splat(stage.friction) * L::load(&contact.force) / speed).store(&mut contact.drag);
+        }
+        let drag = L::if_gt(depth, zero, L::load(&contact.drag), zero);
         force.store(&mut contact.force);
         for r in 0..3 {
             b[r] = drag.neg_mul_add(slide[r], force.mul_add(n[r], b[r]));
