@@ -129,7 +129,11 @@ impl Wind {
         let (mut size, mut period) = (self.turbulence_size, self.turbulence_period);
         for (octave, speed) in OCTAVE_SPEED.iter().enumerate() {
             let key = rng::key(self.seed, octave as u64, TURBULENCE);
-            let own = if period > 0.0 { box7(key)[0] * (time / period) } else { Vec3::zeros() };
+            let own = if period > 0.0 {
+                Vec3::from(SLOPES[(key >> 56) as usize][0]) * (time / period)
+            } else {
+                Vec3::zeros()
+            };
             let x = (point - drift) / size + own;
             sum += curl_noise(key, x) * (speed / CURL_RMS);
             // Turn-over time goes as size / speed, with octaves' speed as size^(1/3).
@@ -198,10 +202,31 @@ fn quintic(t: f64) -> (f64, f64) {
     (t * t * t * (10.0 - t * (15.0 - t * 6.0)), 30.0 * u * u)
 }
 
-/// Nine numbers spread evenly over (-1, 1), in steps of 1/64, from the upper 63 of 64 random bits: three vectors.
-fn box7(bits: u64) -> [Vec3; 3] {
-    let part = |i: u32| (((bits << (7 * i)) as i64 >> 57) as f64 + 0.5) * (1.0 / 64.0);
-    [0, 3, 6].map(|i| Vec3::new(part(i), part(i + 1), part(i + 2)))
+/// 256 random triples of slopes, each component evenly spread over (-1, 1) in steps of 1/64: made once, they
+/// save a fifth of an evaluation. Fewer: the eye finds equal corners in a plane of noise; more leave the nearest cache.
+static SLOPES: [[[f64; 3]; 3]; 256] = slopes();
+
+/// SplitMix64 (G. L. Steele, D. Lea, C. H. Flood 2014): 64 random bits for a number, while compiling.
+const fn split_mix(i: u64) -> u64 {
+    let mut x = (i + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}
+
+const fn slopes() -> [[[f64; 3]; 3]; 256] {
+    let mut table = [[[0.0; 3]; 3]; 256];
+    let mut i = 0;
+    while i < 256 {
+        let bits = split_mix(i as u64);
+        let mut k = 0;
+        while k < 9 {
+            table[i][k / 3][k % 3] = (((bits << (7 * k)) as i64 >> 57) as f64 + 0.5) / 64.0;
+            k += 1;
+        }
+        i += 1;
+    }
+    table
 }
 
 /// Smooth noise in one variable, in [-1, 1], with a random value at every integer.
@@ -221,22 +246,26 @@ const CURL_RMS: f64 = 1.220_08;
 fn curl_noise(key: u64, x: Vec3) -> Vec3 {
     let cell = x.map(f64::floor);
     let f = x - cell;
-    let (wx, wy, wz) = (quintic(f.x), quintic(f.y), quintic(f.z));
-    let base: [u64; 3] = std::array::from_fn(|i| cell[i] as i64 as u64);
+    // Of both ends of the cell along an axis: weight, its slope, distance.
+    let ends = |t: f64| {
+        let (w, dw) = quintic(t);
+        [(1.0 - w, -dw, t), (w, dw, t - 1.0)]
+    };
+    let (wx, wy, wz) = (ends(f.x), ends(f.y), ends(f.z));
+    let lattice = |c: f64, shift: u32| [0, 1].map(|o| ((c as i64).wrapping_add(o) as u64 & 0x1f_ffff) << shift);
+    let (lx, ly, lz) = (lattice(cell.x, 0), lattice(cell.y, 21), lattice(cell.z, 42));
     let mut curl = Vec3::zeros();
-    for corner in 0..8u64 {
-        let o = [corner & 1, corner >> 1 & 1, corner >> 2];
-        let side = |w: (f64, f64), o: u64| if o == 1 { w } else { (1.0 - w.0, -w.1) };
-        let ((ax, dx), (ay, dy), (az, dz)) = (side(wx, o[0]), side(wy, o[1]), side(wz, o[2]));
-        let lattice = |i: usize| base[i].wrapping_add(o[i]) & 0x1f_ffff;
-        let bits = rng::mix(key ^ (lattice(0) | lattice(1) << 21 | lattice(2) << 42));
-        let d = Vec3::new(f.x - o[0] as f64, f.y - o[1] as f64, f.z - o[2] as f64);
+    for corner in 0..8 {
+        let (i, j, k) = (corner & 1, corner >> 1 & 1, corner >> 2);
+        let ((ax, sx, x), (ay, sy, y), (az, sz, z)) = (wx[i], wy[j], wz[k]);
+        let bits = rng::mix(key ^ (lx[i] | ly[j] | lz[k]));
         let weight = ax * ay * az;
-        let slope_of_weight = Vec3::new(dx * ay * az, ax * dy * az, ax * ay * dz);
-        let g = box7(bits);
+        let slope_of_weight = Vec3::new(sx * ay * az, ax * sy * az, ax * ay * sz);
+        let g = &SLOPES[(bits >> 56) as usize];
         // Potential `weight * (g_i . d)`: its curl is grad(weight) x (G d) + weight * curl(G d).
-        let potential = Vec3::new(g[0].dot(&d), g[1].dot(&d), g[2].dot(&d));
-        let turn = Vec3::new(g[2].y - g[1].z, g[0].z - g[2].x, g[1].x - g[0].y);
+        let dot = |g: &[f64; 3]| g[0] * x + g[1] * y + g[2] * z;
+        let potential = Vec3::new(dot(&g[0]), dot(&g[1]), dot(&g[2]));
+        let turn = Vec3::new(g[2][1] - g[1][2], g[0][2] - g[2][0], g[1][0] - g[0][1]);
         curl += slope_of_weight.cross(&potential) + turn * weight;
     }
     curl
@@ -364,6 +393,11 @@ mod tests {
         // Smooth: steps are bounded by 15/8 per unit of noise and period.
         let largest = all.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
         assert!(largest <= 0.02 / wind.gust_period * 0.5 * 2.0 * 2.0 * 15.0 / 8.0, "{largest}");
+        // No point or time is too far to ask for.
+        for far in [1e9, -1e18, f64::INFINITY, f64::NAN] {
+            let u = wind.at(Vec3::new(far, 0.0, 0.0), 1.0, None);
+            assert!(u.iter().all(|x| x.is_finite()) || !far.is_finite());
+        }
         // The past has wind too.
         assert!(wind.at(Vec3::zeros(), -3.2, None).iter().all(|x| x.is_finite()));
     }
@@ -424,6 +458,6 @@ mod tests {
     fn values_are_fixed() {
         // The same on every machine: a change here changes every shot with wind.
         let u = breeze().at(Vec3::new(0.1, -0.2, 0.3), 1.25, None);
-        assert_eq!(u, Vec3::new(2.787717919874983, 0.5558109811980376, 0.13964635004731196));
+        assert_eq!(u, Vec3::new(3.506923487441993, -0.03811368106653579, -1.3451225467494847));
     }
 }
