@@ -6,6 +6,7 @@ pub mod band;
 pub mod body;
 pub mod lanes;
 pub mod simulation;
+pub mod springs;
 pub mod wind;
 
 pub use body::{Body, Motion, Part, Rigid, Shape};

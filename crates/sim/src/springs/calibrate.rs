@@ -1,0 +1,1 @@
+//! Spring constants from a rod's stiffness.
