@@ -8,3 +8,6 @@ pub mod calibrate;
 pub mod layout;
 pub mod plain;
 pub mod tetrahedron;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,341 @@
+//! The plain model against laws and closed forms.
+
+use super::calibrate::{Section, calibrate};
+use super::layout::{End, only_straight, zigzag};
+use super::plain::{Choice, Model, choose, energy, gradient, tangent};
+use super::tetrahedron::volume;
+use crate::{Material, Vec3};
+use pelage_geom::rng;
+
+const SEGMENT: f64 = 4e-3;
+
+/// A straight hair downwards from the origin.
+fn straight(segments: usize) -> Vec<Vec3> {
+    (0..=segments).map(|i| Vec3::new(0.0, -SEGMENT * i as f64, 0.0)).collect()
+}
+
+fn helix(segments: usize) -> Vec<Vec3> {
+    let at = |a: f64| Vec3::new(libm::cos(a), libm::sin(a), 0.3 * a) * 0.02;
+    (0..=segments).map(|i| at(0.2 * i as f64)).collect()
+}
+
+struct Strand {
+    model: Model,
+    choices: Vec<Choice>,
+    x: Vec<Vec3>,
+}
+
+fn strand(points: &[Vec3], ends: [End; 2], section: &Section) -> Strand {
+    let calibration = calibrate(section.twisting / section.bending);
+    let layout = zigzag(points, ends, calibration.height).unwrap();
+    let model = Model::new(&layout, section, &calibration);
+    Strand { choices: model.choices(), x: layout.position, model }
+}
+
+fn hair() -> Section {
+    Section::round(&Material::default())
+}
+
+fn shaken(x: &[Vec3], seed: u64, size: f64) -> Vec<Vec3> {
+    let off = |i: usize| Vec3::from_fn(|c, _| rng::uniform(seed, i as u64, 3, c as u64) - 0.5) * size;
+    x.iter().enumerate().map(|(i, p)| p + off(i)).collect()
+}
+
+/// Solves `(tangent + diagonal) d = rhs` by scalar banded elimination; held particles stay.
+pub(super) fn solve(
+    model: &Model,
+    choices: &[Choice],
+    x: &[Vec3],
+    diagonal: impl Fn(usize) -> f64,
+    rhs: &[Vec3],
+) -> Vec<Vec3> {
+    let n = x.len();
+    let mut rows = vec![[0.0; 12]; 3 * n];
+    for (i, blocks) in tangent(model, choices, x, true).iter().enumerate() {
+        for (k, block) in blocks.iter().enumerate().take(i + 1) {
+            for r in 0..3 {
+                for c in 0..3 {
+                    let (row, column) = (3 * i + r, 3 * (i - k) + c);
+                    if column <= row {
+                        rows[row][row - column] += block[(r, c)];
+                    }
+                }
+            }
+        }
+        for r in 0..3 {
+            rows[3 * i + r][0] += diagonal(i) + if model.held[i] { 1e40 } else { 0.0 };
+        }
+    }
+    let mut y: Vec<f64> = rhs.iter().flat_map(|v| [v.x, v.y, v.z]).collect();
+    for j in 0..3 * n {
+        for r in j + 1..(j + 12).min(3 * n) {
+            let l = rows[r][r - j] / rows[j][0];
+            for k in j + 1..=r {
+                rows[r][r - k] -= l * rows[k][k - j];
+            }
+        }
+        for r in j + 1..(j + 12).min(3 * n) {
+            rows[r][r - j] /= rows[j][0];
+            y[r] -= rows[r][r - j] * y[j];
+        }
+    }
+    for j in (0..3 * n).rev() {
+        y[j] /= rows[j][0];
+        for r in j + 1..(j + 12).min(3 * n) {
+            y[j] -= rows[r][r - j] * y[r];
+        }
+    }
+    y.chunks(3).map(|v| Vec3::new(v[0], v[1], v[2])).collect()
+}
+
+/// Equilibrium under `force` by Newton's method with a proximal term that grows where a step fails.
+fn relax(s: &mut Strand, force: &dyn Fn(usize) -> Vec3, rounds: usize) {
+    let total = |x: &[Vec3], s: &Strand| {
+        energy(&s.model, &s.choices, x) - x.iter().enumerate().map(|(i, p)| p.dot(&force(i))).sum::<f64>()
+    };
+    let mut proximal = 1.0;
+    for _ in 0..rounds {
+        choose(&s.model, &mut s.choices, &mut s.x, 0.2);
+        let g = gradient(&s.model, &s.choices, &s.x);
+        let rhs: Vec<Vec3> = g.iter().enumerate().map(|(i, g)| force(i) - g).collect();
+        let d = solve(&s.model, &s.choices, &s.x, |_| proximal, &rhs);
+        let next: Vec<Vec3> = s.x.iter().zip(&d).map(|(x, d)| x + d).collect();
+        if total(&next, s) <= total(&s.x, s) {
+            s.x = next;
+            proximal *= 0.4;
+        } else {
+            proximal *= 5.0;
+        }
+    }
+}
+
+#[test]
+fn forces_are_the_gradient_of_the_energy() {
+    for (seed, points) in [straight(6), helix(6)].iter().enumerate() {
+        let mut s = strand(points, [End::Clamped, End::Free], &hair());
+        s.x = shaken(&s.x, seed as u64, 0.3 * SEGMENT);
+        choose(&s.model, &mut s.choices, &mut s.x, 0.1);
+        let g = gradient(&s.model, &s.choices, &s.x);
+        let scale = g.iter().fold(0.0_f64, |m, v| m.max(v.norm()));
+        let d = 1e-5 * SEGMENT;
+        for i in 0..s.x.len() {
+            for c in 0..3 {
+                let at = |d: f64| {
+                    let mut x = s.x.clone();
+                    x[i][c] += d;
+                    energy(&s.model, &s.choices, &x)
+                };
+                let difference = (at(d) - at(-d)) / (2.0 * d);
+                assert!((difference - g[i][c]).abs() < 1e-6 * scale, "{i} {c}: {difference} {}", g[i][c]);
+            }
+        }
+    }
+}
+
+#[test]
+fn at_rest_the_tangent_is_the_hessian() {
+    let s = strand(&helix(5), [End::Free; 2], &hair());
+    let a = tangent(&s.model, &s.choices, &s.x, true);
+    let d = 1e-6 * SEGMENT;
+    for i in 0..s.x.len() {
+        for c in 0..3 {
+            let at = |d: f64| {
+                let mut x = s.x.clone();
+                x[i][c] += d;
+                gradient(&s.model, &s.choices, &x)
+            };
+            let (plus, minus) = (at(d), at(-d));
+            for k in 0..=3.min(i) {
+                for r in 0..3 {
+                    let difference = (plus[i - k][r] - minus[i - k][r]) / (2.0 * d);
+                    let scale = a[i][0].norm();
+                    assert!((difference - a[i][k][(c, r)]).abs() < 1e-5 * scale, "{i} {k}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn forces_have_no_resultant_and_no_moment() {
+    let mut s = strand(&helix(8), [End::Free; 2], &hair());
+    s.x = shaken(&s.x, 4, SEGMENT);
+    choose(&s.model, &mut s.choices, &mut s.x, 0.1);
+    let g = gradient(&s.model, &s.choices, &s.x);
+    let scale: f64 = g.iter().map(|g| g.norm()).sum();
+    let sum: Vec3 = g.iter().sum();
+    let moment: Vec3 = g.iter().zip(&s.x).map(|(g, x)| x.cross(g)).sum();
+    assert!(sum.norm() < 1e-13 * scale);
+    assert!(moment.norm() < 1e-14 * scale);
+    // The tangent does not resist translation either.
+    let a = tangent(&s.model, &s.choices, &s.x, true);
+    for i in 0..s.x.len() {
+        let mut row = a[i].iter().take(4.min(i + 1)).sum::<nalgebra::Matrix3<f64>>();
+        for k in 1..4 {
+            if i + k < s.x.len() {
+                row += a[i + k][k].transpose();
+            }
+        }
+        assert!(row.norm() < 1e-12 * a[i][0].norm());
+    }
+}
+
+/// Stiffness in bending (two azimuths) and twisting, over the section's, of a straight clamped strand under a pair of
+/// forces at its end.
+fn stiffness(section: &Section, segments: usize, uneven: bool) -> [f64; 3] {
+    let mut points = straight(segments);
+    if uneven {
+        for (i, p) in points.iter_mut().enumerate() {
+            p.y -= 0.2 * SEGMENT * (i % 2) as f64;
+        }
+    }
+    let s = strand(&points, [End::Clamped, End::Free], section);
+    let n = s.x.len();
+    let free = |force: &dyn Fn(usize) -> Vec3| -> Vec<Vec3> {
+        let rhs: Vec<Vec3> = (0..n).map(force).collect();
+        solve(&s.model, &s.choices, &s.x, |_| 0.0, &rhs)
+    };
+    let length = points[0].y - points[segments].y;
+    let bend = |across: Vec3| {
+        // A moment on the last segment: slope at the end is M L / EI, measured on the last segment's middle; clamped at
+        // point 0 with the hinge there half a segment's.
+        let last = (s.x[n - 1] - s.x[n - 3]).norm();
+        let d = free(&|i| across * (f64::from(u8::from(i == n - 1)) - f64::from(u8::from(i == n - 3))));
+        let slope = (d[n - 1] - d[n - 3]).dot(&across) / last;
+        let moment = last;
+        moment * (length - 0.5 * last) / slope / section.bending
+    };
+    let twist = {
+        // A pair of forces on the last extra particle and the axis below it: only its moment about the axis matters.
+        let axis = Vec3::y();
+        let arm = s.x[n - 2] - (s.x[n - 1] + s.x[n - 3]) * 0.5;
+        let side = axis.cross(&arm).normalize();
+        let d = free(&|i| {
+            if i == n - 2 {
+                side
+            } else if i == n - 1 || i == n - 3 {
+                side * -0.5
+            } else {
+                Vec3::zeros()
+            }
+        });
+        let turn = (d[n - 2] - (d[n - 1] + d[n - 3]) * 0.5).dot(&side) / arm.norm();
+        let last = (s.x[n - 1] - s.x[n - 3]).norm();
+        arm.norm() * (length - 0.5 * last) / turn / section.twisting
+    };
+    [bend(Vec3::x()), bend((Vec3::x() + Vec3::z()).normalize()), twist]
+}
+
+#[test]
+fn stiffness_is_the_sections() {
+    for poisson in [-0.9, -0.5, 0.0, 0.3, 0.5] {
+        let section = Section::round(&Material { poisson, ..Material::default() });
+        // A whole number of turns of the azimuth, with the clamp's hinge counting half.
+        for (uneven, bound) in [(false, 0.01), (true, 0.02)] {
+            let found = stiffness(&section, 64, uneven);
+            println!("poisson {poisson} uneven {uneven}: {found:.4?}");
+            assert!(found.iter().all(|f| (f - 1.0).abs() < bound), "poisson {poisson}, uneven {uneven}: {found:?}");
+        }
+    }
+}
+
+/// Steps with damping in each step until at rest.
+fn recover(s: &mut Strand, rounds: usize) {
+    relax(s, &|_| Vec3::zeros(), rounds);
+}
+
+/// Largest difference of a length or altitude sign from the rest shape's.
+fn misfit(s: &Strand, rest: &[Vec3]) -> (f64, usize) {
+    let mut worst = 0.0_f64;
+    let mut inverted = 0;
+    for i in 1..rest.len() {
+        for k in 1..=3.min(i) {
+            let (l, l0) = ((s.x[i] - s.x[i - k]).norm(), (rest[i] - rest[i - k]).norm());
+            worst = worst.max((l / l0 - 1.0).abs());
+        }
+        if i >= 3 {
+            let of = |x: &[Vec3]| volume([x[i], x[i - 1], x[i - 2], x[i - 3]]).value;
+            inverted += usize::from(of(&s.x) * of(rest) <= 0.0);
+        }
+    }
+    (worst, inverted)
+}
+
+#[test]
+fn spoilt_tetrahedra_recover() {
+    let points = helix(8);
+    let rest = strand(&points, [End::Clamped, End::Free], &hair()).x;
+    let spoil: [(&str, fn(usize, Vec3) -> Vec3); 5] = [
+        ("coplanar", |_, p| Vec3::new(p.x, p.y, 0.0)),
+        ("inverted", |_, p| Vec3::new(p.x, p.y, -p.z)),
+        ("colinear", |_, p| Vec3::new(0.0, 0.0, p.z)),
+        ("colinear in order", |i, _| Vec3::new(0.0, 0.0, 1e-3 * i as f64)),
+        ("to a point", |_, _| Vec3::zeros()),
+    ];
+    for (name, f) in spoil {
+        let mut s = strand(&points, [End::Clamped, End::Free], &hair());
+        for i in 3..s.x.len() {
+            s.x[i] = f(i, s.x[i]);
+        }
+        recover(&mut s, 600);
+        let found = misfit(&s, &rest);
+        println!("{name}: {found:?} energy {:e}", energy(&s.model, &s.choices, &s.x));
+        assert!(found.0 < 1e-3 && found.1 == 0, "{name}: {found:?}");
+    }
+}
+
+#[test]
+fn planar_curls_of_the_paper_are_at_rest_and_recover() {
+    let points: Vec<Vec3> = (0..12)
+        .map(|i| {
+            let a = 0.4 * i as f64;
+            Vec3::new(libm::sin(a), -0.2 * a, 0.0) * 0.01
+        })
+        .collect();
+    let section = hair();
+    let calibration = calibrate(section.twisting / section.bending);
+    let layout = only_straight(&points, [End::Clamped, End::Free]).unwrap();
+    let model = Model::new(&layout, &section, &calibration);
+    let mut s = Strand { choices: model.choices(), x: layout.position.clone(), model };
+    let g = gradient(&s.model, &s.choices, &s.x);
+    assert!(g.iter().all(|g| g.norm() < 1e-15), "not at rest");
+    s.x = shaken(&s.x, 3, 1e-3);
+    recover(&mut s, 300);
+    let found = misfit(&s, &layout.position);
+    assert!(found.0 < 1e-3, "{found:?} energy {:e}", energy(&s.model, &s.choices, &s.x));
+}
+
+#[test]
+fn choices_at_rest_stay() {
+    let mut s = strand(&straight(20), [End::Clamped, End::Free], &hair());
+    let first = s.choices.clone();
+    for round in 0..100 {
+        let mut x = shaken(&s.x, round, 1e-3 * SEGMENT);
+        assert_eq!(choose(&s.model, &mut s.choices, &mut x, 0.0), 0);
+    }
+    assert_eq!(s.choices, first);
+}
+
+#[test]
+fn changes_of_altitude_keep_the_energy() {
+    let mut s = strand(&straight(12), [End::Free; 2], &hair());
+    let mut changes = 0;
+    for round in 0..50 {
+        let mut x = shaken(&s.x, round, 1.5 * SEGMENT);
+        let before = energy(&s.model, &s.choices, &x);
+        changes += choose(&s.model, &mut s.choices, &mut x, 0.0);
+        let after = energy(&s.model, &s.choices, &x);
+        assert!((after / before - 1.0).abs() < 1e-10);
+        choose(&s.model, &mut s.choices, &mut x, 0.3);
+        assert!(energy(&s.model, &s.choices, &x) <= after * (1.0 + 1e-12));
+    }
+    assert!(changes > 100);
+}
+
+#[test]
+fn mass_is_the_hairs() {
+    let s = strand(&straight(10), [End::Clamped, End::Free], &hair());
+    let real: f64 = s.model.mass[2..].iter().sum();
+    // Half the ghost segment's mass sits on the ghosts, none on point 0.
+    assert!((real / (hair().line_density * 10.0 * SEGMENT) - 1.0).abs() < 1e-12);
+}
