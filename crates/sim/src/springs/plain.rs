@@ -1,7 +1,7 @@
 //! The mass-spring model of one strand, scalar: energy, gradient and tangent (sections 3.1, 3.2, 4.1).
 //!
 //! The reference for the lane kernel. A spring's energy is `k/2 l0 (l/l0 - 1)^2`, its force `k (l/l0 - 1)` as in section
-//! 4.1, `k` in newtons. An altitude spring's is `K/2 e^2` with the strain `e = h s/h0 - rest + carried`: `h0` the
+//! 4.1, `k` in newtons. An altitude spring's is `K/2 e^2` (more where it is nearly flat, [`HALF`]) with the strain `e = h s/h0 - rest + carried`: `h0` the
 //! rest height of the altitude in use, `s` the sign of the rest tetrahedron, `rest` 1 (less for tetrahedra nearly flat at
 //! rest), and `carried` what keeps the energy continuous when the altitude changes.
 
@@ -20,6 +20,14 @@ pub const EXTRA_MASS: f64 = 1e-3;
 /// A tetrahedron whose least altitude at rest is below this fraction of its size is measured against this instead:
 /// strains of a flat one would be infinite. Larger values soften good tetrahedra (a straight hair's are at 0.4).
 pub const FLAT: f64 = 0.05;
+
+/// Strain below which an altitude spring is [`FIRM`] times as stiff: a tetrahedron that is nearly flat or inverted. Bent
+/// hair stays above (a hinge of 0.5 rad: -0.4); with the soft constant alone inverted tetrahedra stay so, held by the
+/// torsion springs' other rest state.
+pub const HALF: f64 = -0.5;
+
+/// How much stiffer altitude springs are below [`HALF`]: then as stiff as torsion springs.
+pub const FIRM: f64 = 10.0;
 
 /// The altitude in use changes when another's `|u x v|` is this much larger, squared (20 %). At 1 it changes for ever at
 /// rest; at 2 the paper's bound on the weights is lost.
@@ -255,6 +263,13 @@ fn altitude(model: &Model, choices: &[Choice], x: &[Vec3], i: usize) -> (f64, Ve
     (h * t.inverse_height[c.candidate as usize] - t.rest + c.carried, n, w)
 }
 
+/// Energy of an altitude spring of constant 1, its derivative in the strain, and the second.
+fn altitude_law(strain: f64) -> (f64, f64, f64) {
+    let below = (strain - HALF).min(0.0);
+    let energy = 0.5 * (strain * strain + (FIRM - 1.0) * below * below);
+    (energy, (FIRM - 1.0).mul_add(below, strain), if strain < HALF { FIRM } else { 1.0 })
+}
+
 /// Elastic energy, joules.
 pub fn energy(model: &Model, choices: &[Choice], x: &[Vec3]) -> f64 {
     let mut sum = 0.0;
@@ -266,7 +281,7 @@ pub fn energy(model: &Model, choices: &[Choice], x: &[Vec3]) -> f64 {
         }
         if i >= 3 {
             let strain = altitude(model, choices, x, i).0;
-            sum += 0.5 * model.tetrahedron[i].stiffness * strain * strain;
+            sum += model.tetrahedron[i].stiffness * altitude_law(strain).0;
         }
     }
     sum
@@ -286,7 +301,7 @@ pub fn gradient(model: &Model, choices: &[Choice], x: &[Vec3]) -> Vec<Vec3> {
         if i >= 3 {
             let (strain, n, w) = altitude(model, choices, x, i);
             let t = &model.tetrahedron[i];
-            let f = t.stiffness * strain * t.inverse_height[choices[i].candidate as usize];
+            let f = t.stiffness * altitude_law(strain).1 * t.inverse_height[choices[i].candidate as usize];
             for k in 0..4 {
                 g[i - k] += n * (f * w[k]);
             }
@@ -314,10 +329,10 @@ pub fn tangent(model: &Model, choices: &[Choice], x: &[Vec3], geometric: bool) -
             a[i][k] -= m;
         }
         if i >= 3 {
-            let (_, n, w) = altitude(model, choices, x, i);
+            let (strain, n, w) = altitude(model, choices, x, i);
             let t = &model.tetrahedron[i];
             let f = t.inverse_height[choices[i].candidate as usize];
-            let m = n * n.transpose() * (t.stiffness * f * f);
+            let m = n * n.transpose() * (t.stiffness * altitude_law(strain).2 * f * f);
             for k in 0..4 {
                 for back in k..4 {
                     a[i - k][back - k] += m * (w[k] * w[back]);
@@ -331,8 +346,8 @@ pub fn tangent(model: &Model, choices: &[Choice], x: &[Vec3], geometric: bool) -
 /// Chooses the altitudes anew: once a step, before it.
 ///
 /// Moves the last particle of a colinear tetrahedron off its line ([`NUDGE`]). `relax` in 0..=1 is the fraction of the
-/// carried strain to forget, only as far as that lowers the energy: what a collapse left behind fades, and no energy is
-/// made. Returns how many changed.
+/// carried strain to forget: where that lowers the energy, as far as it does, and where the tetrahedron is flat or
+/// inverted ([`HALF`]), whatever it takes: else the carried strain could hold it so. Returns how many changed.
 pub fn choose(model: &Model, choices: &mut [Choice], x: &mut [Vec3], relax: f64) -> usize {
     let mut changed = 0;
     for i in 3..x.len() {
@@ -358,9 +373,14 @@ pub fn choose(model: &Model, choices: &mut [Choice], x: &mut [Vec3], relax: f64)
             changed += 1;
         }
         let carried = choices[i].carried;
-        if carried * strain > 0.0 {
-            choices[i].carried -= (relax * carried.abs()).min(strain.abs()).copysign(carried);
-        }
+        let fade = if strain - carried < HALF {
+            relax * carried.abs()
+        } else if carried * strain > 0.0 {
+            (relax * carried.abs()).min(strain.abs())
+        } else {
+            0.0
+        };
+        choices[i].carried -= fade.copysign(carried);
     }
     changed
 }
