@@ -5,6 +5,7 @@
 //! strand's matrix has a half-bandwidth of three particles.
 
 pub mod calibrate;
+pub mod kernel;
 pub mod layout;
 pub mod plain;
 pub mod tetrahedron;

@@ -1,9 +1,12 @@
 //! The plain model against laws and closed forms.
 
+use super::kernel;
 use super::calibrate::{Section, calibrate};
 use super::layout::{End, only_straight, zigzag};
 use super::plain::{Choice, Model, choose, energy, gradient, tangent};
 use super::tetrahedron::volume;
+use crate::band::{self, Column, HELD, Panel, RING, Window};
+use crate::lanes::{self, Kernel, LANES, Lanes, Pack, Width};
 use crate::{Material, Vec3};
 use pelage_geom::rng;
 
@@ -330,4 +333,117 @@ fn mass_is_the_hairs() {
     let real: f64 = s.model.mass[2..].iter().sum();
     // Half the ghost segment's mass sits on the ghosts, none on point 0.
     assert!((real / (hair().line_density * 10.0 * SEGMENT) - 1.0).abs() < 1e-12);
+}
+
+/// One solve of `(1 + tangent) d = forces` for a group, after choosing altitudes; and the energy.
+struct GroupSolve<'a> {
+    group: &'a kernel::Group,
+    altitudes: &'a [kernel::NodeAltitude],
+    x: &'a [[Pack; 3]],
+}
+
+impl Kernel for GroupSolve<'_> {
+    type Out = (Vec<[Pack; 3]>, Vec<kernel::NodeAltitude>, Vec<[Pack; 3]>, Pack);
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Self::Out {
+        let n = self.x.len();
+        let mut x = self.x.to_vec();
+        let mut altitudes = self.altitudes.to_vec();
+        for i in 3..n {
+            kernel::choose_node::<L>(i, &self.group.candidates[i], &mut altitudes[i], &mut x, L::splat(0.1));
+        }
+        let mut energy = L::splat(0.0);
+        let mut rhs = vec![[Pack::default(); 3]; n + 3];
+        let mut factor: Vec<Column<3, 12>> = vec![[[Pack::default(); 3]; 12]; n];
+        let mut window: Window<L, 3, 12> = [Panel::zero(); RING];
+        for i in 0..n + 3 {
+            if i < n {
+                window[i % RING] = Panel::zero();
+                for c in 0..3 {
+                    window[i % RING].0[c][c] = L::load(&self.group.held[i]).mul_add(L::splat(HELD), L::splat(1.0));
+                }
+                let (model, altitude) = (&self.group.model[i], &altitudes[i]);
+                kernel::add_node::<L, true>(i, model, altitude, &x, &mut window, &mut rhs);
+                energy = energy + kernel::energy_node::<L>(i, model, altitude, &x);
+            }
+            if i >= 3 {
+                band::eliminate(i - 3, &mut window, &mut factor[i - 3], &mut rhs);
+            }
+        }
+        for r in &mut rhs[n..] {
+            *r = [Pack::default(); 3];
+        }
+        for i in (0..n).rev() {
+            band::substitute::<L, 3, 12>(i, &factor[i], &mut rhs);
+        }
+        let mut total = Pack::default();
+        energy.store(&mut total);
+        (rhs, altitudes, x, total)
+    }
+}
+
+#[test]
+fn lanes_do_as_the_plain_model() {
+    let mut strands: Vec<Strand> = (0..7)
+        .map(|lane: usize| {
+            let points = if lane % 2 == 0 { straight(9 + lane) } else { helix(12 - lane) };
+            strand(&points, [End::Clamped, End::Free], &hair())
+        })
+        .collect();
+    let models: Vec<&Model> = strands.iter().map(|s| &s.model).collect();
+    let group = kernel::pack(&models);
+    let choices: Vec<(&Model, &[Choice])> = strands.iter().map(|s| (&s.model, &s.choices[..])).collect();
+    let mut altitudes = kernel::pack_altitudes(&choices);
+    for round in 0..20 {
+        let mut x = vec![[Pack::default(); 3]; group.mass.len()];
+        for (lane, s) in strands.iter_mut().enumerate() {
+            let size = [0.01, 0.3, 1.5][round % 3] * SEGMENT;
+            let from = s.x.clone();
+            s.x = shaken(&s.x, (8 * round + lane) as u64, size);
+            if lane == 6 && round % 5 == 0 {
+                s.x.iter_mut().enumerate().for_each(|(i, p)| *p = Vec3::new(1e-3 * i as f64, 0.0, 0.0));
+            }
+            s.x[..3].copy_from_slice(&from[..3]);
+            for (i, p) in s.x.iter().enumerate() {
+                for c in 0..3 {
+                    x[i][c].0[lane] = p[c];
+                }
+            }
+        }
+        let run = |w| lanes::run(w, GroupSolve { group: &group, altitudes: &altitudes, x: &x });
+        let found = run(Width::Plain);
+        for w in Width::available() {
+            assert!(run(w) == found, "{w:?}");
+        }
+        let mut expected = Vec::new();
+        for s in &mut strands {
+            choose(&s.model, &mut s.choices, &mut s.x, 0.1);
+            let g: Vec<Vec3> = gradient(&s.model, &s.choices, &s.x).iter().map(|g| -g).collect();
+            let d = solve(&s.model, &s.choices, &s.x, |_| 1.0, &g);
+            expected.push((d, energy(&s.model, &s.choices, &s.x)));
+        }
+        for (lane, (d, e)) in expected.iter().enumerate() {
+            let scale = d.iter().fold(0.0_f64, |m, v| m.max(v.norm()));
+            for i in 0..d.len() {
+                for c in 0..3 {
+                    let (a, b) = (found.0[i][c].0[lane], d[i][c]);
+                    assert!((a - b).abs() < 1e-11 * scale, "round {round} lane {lane} particle {i}: {a:e} {b:e}");
+                }
+            }
+            assert!((found.3.0[lane] / e - 1.0).abs() < 1e-11);
+        }
+        for i in 0..group.mass.len() {
+            for lane in strands.len()..LANES {
+                assert_eq!(found.0[i][0].0[lane], 0.0);
+            }
+        }
+        altitudes = found.1;
+        let choices: Vec<(&Model, &[Choice])> = strands.iter().map(|s| (&s.model, &s.choices[..])).collect();
+        for (i, (a, b)) in altitudes.iter().zip(kernel::pack_altitudes(&choices)).enumerate().skip(3) {
+            for (lane, _) in strands.iter().enumerate().filter(|(_, s)| i < s.x.len()) {
+                assert!((0..3).all(|j| a.face[j].0[lane] == b.face[j].0[lane]), "round {round} particle {i}");
+                assert!((a.offset.0[lane] - b.offset.0[lane]).abs() < 1e-10);
+            }
+        }
+    }
 }
