@@ -108,7 +108,9 @@ fn main() {
                     best = best.min(start.elapsed().as_secs_f64());
                 }
                 let ns = best * 1e9 / (groups * n * 8) as f64;
-                println!("{width:?} {name}, choosing {choose}: {ns:.1} ns per particle and step ({n} particles a strand)");
+                println!(
+                    "{width:?} {name}, choosing {choose}: {ns:.1} ns per particle and step ({n} particles a strand)"
+                );
             }
         }
     }

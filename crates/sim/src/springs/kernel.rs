@@ -308,7 +308,8 @@ pub fn choose_node<L: Lanes>(
     let n = lanes::mul_add3(a[0], face[0], lanes::mul_add3(a[1], face[1], lanes::scale3(a[2], face[2])));
     let now2 = lanes::dot(n, n);
     let rest = L::load(&candidates.rest);
-    let strain_of = |area2: L, inverse_height: L| value * (one / (area2 + L::splat(TINY))).sqrt() * inverse_height - rest;
+    let strain_of =
+        |area2: L, inverse_height: L| value * (one / (area2 + L::splat(TINY))).sqrt() * inverse_height - rest;
     let (mut best2, mut best) = (now2, face);
     let mut inverse_height = L::load(&node.inverse_height);
     let before = strain_of(now2, inverse_height);

@@ -144,8 +144,7 @@ fn transport(v: Vec3, a: Vec3, b: Vec3) -> Vec3 {
     let c = a.dot(&b);
     let axis = a.cross(&b);
     // Rodrigues' formula with (1 - cos) / sin^2 = 1 / (1 + cos); a reversal leaves v as it is.
-    let turned =
-        if c > -1.0 + 1e-12 { v * c + axis.cross(&v) + axis * (axis.dot(&v) / (1.0 + c)) } else { v };
+    let turned = if c > -1.0 + 1e-12 { v * c + axis.cross(&v) + axis * (axis.dot(&v) / (1.0 + c)) } else { v };
     let across = turned - b * b.dot(&turned);
     if across.norm() > 1e-6 { across.normalize() } else { perpendicular(b) }
 }

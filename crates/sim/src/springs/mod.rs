@@ -8,6 +8,7 @@ pub mod calibrate;
 pub mod kernel;
 pub mod layout;
 pub mod plain;
+pub mod sag;
 pub mod tetrahedron;
 
 #[cfg(test)]

@@ -184,7 +184,8 @@ struct Constants<'a> {
 impl Constants<'_> {
     /// The axis particle before or after `h`.
     fn neighbour(&self, h: usize, after: bool) -> Option<usize> {
-        let step = |i: usize| if after { Some(i + 1).filter(|&j| j < self.layout.extra.len()) } else { i.checked_sub(1) };
+        let step =
+            |i: usize| if after { Some(i + 1).filter(|&j| j < self.layout.extra.len()) } else { i.checked_sub(1) };
         let next = step(h)?;
         if self.layout.extra[next] { step(next) } else { Some(next) }
     }

@@ -1,9 +1,10 @@
 //! The plain model against laws and closed forms.
 
-use super::kernel;
 use super::calibrate::{Section, calibrate};
+use super::kernel;
 use super::layout::{End, only_straight, zigzag};
 use super::plain::{Choice, Model, choose, energy, gradient, tangent};
+use super::sag::{LIMIT, without_sag};
 use super::tetrahedron::volume;
 use crate::band::{self, Column, HELD, Panel, RING, Window};
 use crate::lanes::{self, Kernel, LANES, Lanes, Pack, Width};
@@ -333,6 +334,91 @@ fn mass_is_the_hairs() {
     let real: f64 = s.model.mass[2..].iter().sum();
     // Half the ghost segment's mass sits on the ghosts, none on point 0.
     assert!((real / (hair().line_density * 10.0 * SEGMENT) - 1.0).abs() < 1e-12);
+}
+
+fn along(segments: usize, length: f64, at: impl Fn(f64) -> Vec3) -> Vec<Vec3> {
+    (0..=segments).map(|i| at(length * i as f64 / segments as f64)).collect()
+}
+
+#[test]
+fn a_groomed_pose_stands() {
+    let gravity = Vec3::new(0.0, -9.81, 0.0);
+    let poses: [(&str, f64, Vec<Vec3>); 4] = [
+        ("horizontal 10 cm", 0.1, along(50, 0.1, |s| Vec3::new(s, 0.0, 0.0))),
+        ("horizontal 20 cm", 0.2, along(50, 0.2, |s| Vec3::new(s, 0.0, 0.0))),
+        ("hanging 20 cm", 0.2, along(50, 0.2, |s| Vec3::new(0.0, -s, 0.0))),
+        ("arc 20 cm", 0.2, along(50, 0.2, |s| Vec3::new(libm::sin(10.0 * s), libm::cos(10.0 * s) - 1.0, 0.0) * 0.1)),
+    ];
+    for (name, length, points) in poses {
+        let mut s = strand(&points, [End::Clamped, End::Free], &hair());
+        let sagged = without_sag(&mut s.model, &s.x, gravity).unwrap();
+        let start = s.x.clone();
+        let mass = s.model.mass.clone();
+        settle(&mut s, &|i| gravity * mass[i], 1e-3, 1000);
+        let drift = s.x.iter().zip(&start).fold(0.0_f64, |m, (a, b)| m.max((a - b).norm())) / length;
+        println!("{name}: {sagged:?}, drift {drift:e} L");
+        assert!(drift < 1e-9, "{name}: {drift:e}");
+        assert_eq!(sagged.factor, 1.0);
+    }
+}
+
+#[test]
+fn long_hair_is_stiffened_to_stand_in_a_hard_pose() {
+    let gravity = Vec3::new(0.0, -9.81, 0.0);
+    let mut s = strand(&along(50, 0.5, |s| Vec3::new(s, 0.0, 0.0)), [End::Clamped, End::Free], &hair());
+    let mut again = s.model.clone();
+    let sagged = without_sag(&mut again, &s.x, gravity).unwrap();
+    assert!(sagged.load > LIMIT && sagged.factor > 1.0, "{sagged:?}");
+    let g = gradient(&again, &s.choices, &s.x);
+    for i in 3..s.x.len() {
+        assert!((g[i] - gravity * again.mass[i]).norm() < 1e-12);
+    }
+    s.model.held[50] = true;
+    assert!(without_sag(&mut s.model, &s.x, gravity).is_none());
+}
+
+/// Tip of a clamped horizontal rod, over its length, and its drop: `theta'' = -Gamma (1 - s) cos theta` by shooting.
+fn elastica(gamma: f64) -> [f64; 2] {
+    let shoot = |k0: f64| {
+        let n = 4000;
+        let h = 1.0 / n as f64;
+        let f = |s: f64, y: [f64; 4]| [y[1], -gamma * (1.0 - s) * libm::cos(y[0]), libm::cos(y[0]), libm::sin(y[0])];
+        let mut y = [0.0, k0, 0.0, 0.0];
+        for i in 0..n {
+            let s = i as f64 * h;
+            let add = |a: [f64; 4], b: [f64; 4], t: f64| -> [f64; 4] { std::array::from_fn(|c| a[c] + t * b[c]) };
+            let k1 = f(s, y);
+            let k2 = f(s + 0.5 * h, add(y, k1, 0.5 * h));
+            let k3 = f(s + 0.5 * h, add(y, k2, 0.5 * h));
+            let k4 = f(s + h, add(y, k3, h));
+            y = std::array::from_fn(|c| y[c] + h / 6.0 * (k1[c] + 2.0 * k2[c] + 2.0 * k3[c] + k4[c]));
+        }
+        y
+    };
+    let (mut low, mut high) = (0.0, gamma);
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        if shoot(middle)[1] > 0.0 { high = middle } else { low = middle }
+    }
+    let y = shoot(low);
+    [y[2], y[3]]
+}
+
+#[test]
+fn cantilever_bends_as_the_elastica() {
+    for (gamma, segments, bound) in [(1.0, 50, 0.01), (10.0, 50, 0.01), (100.0, 50, 0.01), (100.0, 100, 0.005)] {
+        let section = hair();
+        let length = (gamma * section.bending / (section.line_density * 9.81)).cbrt();
+        let mut s = strand(&along(segments, length, |s| Vec3::new(s, 0.0, 0.0)), [End::Clamped, End::Free], &section);
+        let gravity = Vec3::new(0.0, -9.81, 0.0);
+        let mass = s.model.mass.clone();
+        settle(&mut s, &|i| gravity * mass[i], 2e-3, 1000);
+        let tip = s.x[s.x.len() - 1] / length;
+        let [x, drop] = elastica(gamma);
+        let error = (Vec3::new(x, -drop, 0.0) - tip).norm();
+        println!("Gamma {gamma}, {segments} segments: tip {tip:?}, elastica {x:.5} {drop:.5}, error {error:.5} L");
+        assert!(error < bound);
+    }
 }
 
 /// One solve of `(1 + tangent) d = forces` for a group, after choosing altitudes; and the energy.
