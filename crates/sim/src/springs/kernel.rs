@@ -52,6 +52,8 @@ pub struct Group {
     pub mass: Vec<Pack>,
     /// 1 for held particles and padding, 0 for free ones.
     pub held: Vec<Pack>,
+    /// 1 where the particle before is an extra one: the axis runs from the second particle before.
+    pub skip: Vec<Pack>,
 }
 
 /// Packs at most [`LANES`] strands; further lanes and the ends of shorter strands are inert.
@@ -63,6 +65,7 @@ pub fn pack(strands: &[&Model]) -> Group {
         candidates: vec![NodeCandidates::default(); n],
         mass: vec![one; n],
         held: vec![one; n],
+        skip: vec![zero; n],
     };
     for (lane, s) in strands.iter().enumerate().take(LANES) {
         for i in 0..s.mass.len() {
@@ -82,6 +85,7 @@ pub fn pack(strands: &[&Model]) -> Group {
             let held = f64::from(u8::from(s.held[i]));
             group.held[i].0[lane] = held;
             c.free.0[lane] = 1.0 - held;
+            group.skip[i].0[lane] = f64::from(u8::from(i >= 2 && s.extra[i - 1]));
         }
     }
     group

@@ -7,6 +7,7 @@
 pub mod calibrate;
 pub mod kernel;
 pub mod layout;
+pub mod paper;
 pub mod plain;
 pub mod sag;
 pub mod tetrahedron;

@@ -81,6 +81,8 @@ pub struct Model {
     pub held: Vec<bool>,
     /// Point of the hair that a particle is, or [`NONE`].
     pub point: Vec<u32>,
+    /// True for extra particles, off the axis.
+    pub extra: Vec<bool>,
     /// Springs from particle `i` to `i - 1`, `i - 2`, `i - 3`.
     pub spring: Vec<[Spring; 3]>,
     /// Altitude springs of particles `i - 3 ..= i`.
@@ -96,6 +98,7 @@ impl Model {
             mass: masses(layout, section.line_density),
             held: layout.held.clone(),
             point: layout.point.clone(),
+            extra: layout.extra.clone(),
             spring: vec![[Spring::default(); 3]; n],
             tetrahedron: vec![Tetrahedron::default(); n],
         };

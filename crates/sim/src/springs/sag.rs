@@ -8,7 +8,6 @@
 use super::plain::Model;
 use crate::Vec3;
 use nalgebra::Matrix3;
-use pelage_geom::NONE;
 
 /// Largest `|t| / k` of bending and torsion springs that is left as it is. At 1 a rest length would be infinite or a
 /// spring's stiffness gone; at 0.1 the tips of hair of 15 cm are stiffened needlessly.
@@ -47,8 +46,8 @@ pub fn without_sag(model: &mut Model, x: &[Vec3], gravity: Vec3) -> Option<Sagge
         return None;
     }
     // A spring bends or twists unless it is a triangle's side.
-    let points: Vec<bool> = model.point.iter().map(|&p| p != NONE).collect();
-    let hinge = |i: usize, k: usize| k == 3 || (k == 2 && points[i - 1]);
+    let extra = model.extra.clone();
+    let hinge = |i: usize, k: usize| k == 3 || (k == 2 && !extra[i - 1]);
     let constant = |i: usize, k: usize| model.spring[i][k - 1].stiffness * model.spring[i][k - 1].length;
     let mut load = 0.0_f64;
     for (i, t) in tension.iter().enumerate().skip(3) {

