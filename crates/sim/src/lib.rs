@@ -13,6 +13,7 @@ pub mod rod;
 pub mod settle;
 pub mod simulation;
 pub mod stage;
+pub mod springs;
 pub mod wind;
 
 pub use body::{Body, Hit, Motion, Part, Rigid, Shape};
