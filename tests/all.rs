@@ -7,3 +7,4 @@ mod golden;
 mod reference;
 mod rows;
 mod samples;
+mod simulate;

@@ -2,7 +2,7 @@
 //! kills and beside other runs.
 
 use pelage_geom::rng;
-use pelage_tests::{ShotFolder, small_shot};
+use pelage_tests::{ShotFolder, simulated_shot, small_shot};
 use std::collections::BTreeMap;
 use std::process::{Child, Stdio};
 use std::time::Duration;
@@ -65,15 +65,22 @@ impl Dice {
     }
 }
 
+/// Six frames of simulated hair, in one layer all of it and in the other the control hairs.
+fn simulated() -> ShotFolder {
+    let shot = simulated_shot(COMMAND, 6);
+    shot.edit(GROOM, "name = \"over\"", "name = \"over\"\nsimulate = \"control-hairs\"");
+    shot
+}
+
 #[test]
 fn threads_do_not_show() {
-    let shot = every_format();
-    let expected = reference(&shot);
-    assert_eq!(expected.0.len(), 9, "two whole-shot files, six frames and a picture");
-    for jobs in ["2", "5"] {
-        let other = shot.fresh();
-        other.report(&["--jobs", jobs]);
-        assert_finished(&other, &expected, &format!("--jobs {jobs}"));
+    for shot in [every_format(), simulated()] {
+        let expected = reference(&shot);
+        for jobs in ["2", "5"] {
+            let other = shot.fresh();
+            other.report(&["--jobs", jobs]);
+            assert_finished(&other, &expected, &format!("--jobs {jobs}"));
+        }
     }
 }
 
@@ -81,6 +88,13 @@ fn threads_do_not_show() {
 fn splits_do_not_show() {
     let shot = every_format();
     let expected = reference(&shot);
+    assert_eq!(expected.0.len(), 9, "two whole-shot files, six frames and a picture");
+    split(&shot, &expected);
+    let shot = simulated();
+    split(&shot, &reference(&shot));
+}
+
+fn split(shot: &ShotFolder, expected: &(Files, Files)) {
     let mut dice = Dice(0);
     for round in 0..4 {
         let other = shot.fresh();
@@ -95,7 +109,7 @@ fn splits_do_not_show() {
         for part in split.iter().filter(|p| !p.is_empty()) {
             other.report(&["--frames", &part.join(",")]);
         }
-        assert_finished(&other, &expected, &format!("split {split:?}"));
+        assert_finished(&other, expected, &format!("split {split:?}"));
         assert!(other.succeed(&["run"]).starts_with("nothing to do"));
     }
 }
@@ -135,14 +149,30 @@ fn kills_do_not_show() {
     let shot = every_format();
     shot.edit("pipeline.toml", "frames = [1, 6]", "frames = [1, 12]");
     shot.edit(GROOM, "value = 4.0", "value = 30.0");
-    let expected = reference(&shot);
+    kill_often(&shot, 30, 160);
+}
+
+#[test]
+fn kills_do_not_show_in_simulated_hair() {
+    let shot = simulated();
+    // One stretch of several frames: a killed run leaves a part of it.
+    shot.edit("pipeline.toml", "checkpoint = 2", "checkpoint = 4");
+    shot.edit("pipeline.toml", "[\"usd\", \"mcap\"]", "[\"mcap\"]");
+    shot.edit(GROOM, "value = 0.6", "value = 6.0");
+    kill_often(&shot, 30, 160);
+}
+
+/// Kills runs of a shot at random moments, up to so many milliseconds after their start; what they leave and what comes
+/// of it must be whole.
+fn kill_often(shot: &ShotFolder, most: u32, within: u64) {
+    let expected = reference(shot);
     let (mut dice, mut kills, mut rounds) = (Dice(1000), 0, 0);
-    while kills < 30 {
+    while kills < most {
         let other = shot.fresh();
         rounds += 1;
         for _ in 0..15 {
             let mut child = start(&other, &[]);
-            std::thread::sleep(Duration::from_millis(dice.below(160)));
+            std::thread::sleep(Duration::from_millis(dice.below(within)));
             let ended = child.try_wait().expect("a child").is_some();
             child.kill().expect("a child to kill");
             let out = child.wait_with_output().expect("an end");
@@ -216,8 +246,16 @@ fn put(shot: &ShotFolder, name: &str, bytes: Option<Vec<u8>>) {
 
 #[test]
 fn damaged_entries_are_made_again() {
-    let shot = small_shot(COMMAND, 2);
-    let expected = reference(&shot);
+    damage_often(&small_shot(COMMAND, 2));
+}
+
+#[test]
+fn damaged_checkpoints_are_made_again() {
+    damage_often(&simulated());
+}
+
+fn damage_often(shot: &ShotFolder) {
+    let expected = reference(shot);
     shot.report(&[]);
     let all = [
         "flip a bit",
@@ -236,7 +274,7 @@ fn damaged_entries_are_made_again() {
             let file = name.rsplit('/').next().expect("a name");
             let mut same_kind = entries.iter().filter(|(n, b)| n.rsplit('/').next() == Some(file) && *b != bytes);
             let other = same_kind.next().map_or(&b"?"[..], |(_, b)| b);
-            put(&shot, name, damage(how, name, bytes, other));
+            put(shot, name, damage(how, name, bytes, other));
         }
         assert_eq!(shot.pelage(&["cache", "verify"]).status.code(), Some(1), "{how}");
         std::fs::remove_dir_all(shot.path().join("out")).expect("outputs");
@@ -244,7 +282,7 @@ fn damaged_entries_are_made_again() {
         let talk = String::from_utf8_lossy(&out.stderr);
         assert!(out.status.success() && talk.contains("warning: cache entry "), "{how}: {talk}");
         assert!(!talk.contains("panicked"), "{how}: {talk}");
-        assert_finished(&shot, &expected, how);
+        assert_finished(shot, &expected, how);
         shot.succeed(&["cache", "verify"]);
         assert!(shot.succeed(&["run"]).starts_with("nothing to do"), "{how}");
     }

@@ -103,7 +103,7 @@ impl ShotFolder {
 
     /// Files that only an unfinished run has: none are left when it has ended.
     pub fn leftovers(&self) -> Vec<String> {
-        let unfinished = |n: &String| n.ends_with(".part") || n.contains("/v1/tmp/");
+        let unfinished = |n: &String| n.ends_with(".part") || n.contains("/v1/tmp/") || n.contains("/v1/unfinished/");
         files_below(self.path()).into_keys().filter(unfinished).collect()
     }
 }
@@ -251,6 +251,16 @@ fn stored_zlib(data: &[u8]) -> Vec<u8> {
     out
 }
 
+/// The small shot with few hairs, all simulated; a checkpoint after every second frame.
+pub fn simulated_shot(command: &str, frames: u32) -> ShotFolder {
+    let shot = small_shot(command, frames);
+    shot.edit("grooms/ball.toml", "value = 4.0", "value = 0.6");
+    shot.edit("grooms/ball.toml", "density = { value = 1.0 }", "density = { value = 0.3 }");
+    shot.edit("pipeline.toml", "target = \"off\"", "segments = 8\ncheckpoint = 2");
+    shot.edit("pipeline.toml", "fps = 24", "fps = 24\npreroll = 3");
+    shot
+}
+
 /// A small two-layer shot on a ball of radius 5 cm with six charts, moved rigidly over `frames` frames.
 pub fn small_shot(command: &str, frames: u32) -> ShotFolder {
     let shot = ShotFolder::new(command);
@@ -283,6 +293,9 @@ motion = "grooms/ball.csv"
 
 [groom]
 file = "grooms/ball.toml"
+
+[simulate]
+target = "off"
 
 [export]
 formats = ["usd", "mcap"]

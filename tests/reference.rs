@@ -29,10 +29,11 @@ fn is_list(root: &Value, v: &Value) -> bool {
 /// The kind of value in a word or two.
 fn kind(root: &Value, v: &Value) -> String {
     if let Some(options) = v["anyOf"].as_array() {
-        return kind(root, options.iter().find(|o| o["type"] != "null").expect("a value besides null"));
+        let all: Vec<String> = options.iter().filter(|o| o["type"] != "null").map(|o| kind(root, o)).collect();
+        return all.join(" or ");
     }
-    if v["$ref"].is_string() {
-        return kind(root, target(root, v));
+    if let Some(name) = v["$ref"].as_str() {
+        return kind(root, &root["$defs"][name.rsplit('/').next().expect("a name")]);
     }
     if let Some(choices) = v["oneOf"].as_array().or(v["enum"].as_array()) {
         let name = |c: &Value| c["const"].as_str().or(c.as_str()).map(|s| format!("`\"{s}\"`"));

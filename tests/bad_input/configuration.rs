@@ -147,6 +147,58 @@ fn values_out_of_range_in_the_shot() {
 }
 
 #[test]
+fn values_of_the_simulation() {
+    let mut corpus = Corpus::new();
+    let simulate = |text: &str| format!("target = \"off\"\n{text}");
+    for (text, words) in [
+        ("segments = 0", "simulate.segments|out of range|help:"),
+        ("segments = 5000", "simulate.segments|out of range|help:"),
+        ("substeps = 0", "simulate.substeps|out of range|help:"),
+        ("substeps = -1", "invalid value"),
+        ("strain_limit = 0", "simulate.strain_limit|out of range|help:"),
+        ("friction = -0.1", "simulate.friction|out of range"),
+        ("friction = nan", "simulate.friction|out of range"),
+        ("offset = inf", "simulate.offset|millimetres"),
+        ("teleport = 0", "simulate.teleport|metres"),
+        ("checkpoint = 0", "simulate.checkpoint|out of range"),
+        ("model = \"rods\"", "did you mean `rod`?"),
+        ("sleep = 1", "expected a boolean"),
+        ("gravity = \"down\"", "expected a number, three numbers, or a list of { frame, value }"),
+        ("gravity = nan", "simulate.gravity|out of range|help:"),
+        ("gravity = [0, 1e300, 0]", "simulate.gravity|out of range|help:"),
+        ("gravity = [{ frame = 1 }]", "missing field `value`"),
+        ("gravity = [{ frame = 2, value = 1 }, { frame = 2, value = 3 }]", "simulate.gravity[1]|does not come after"),
+        ("gravity = [{ frame = nan, value = 1 }]", "simulate.gravity|does not come after"),
+        ("wind = { speed = 3 }", "unknown field `speed`"),
+        ("wind = { velocity = 3 }", "line"),
+        ("wind = { velocity = [1, 2] }", "line|array of 3 values"),
+        ("wind = { velocity = [1, 2, inf] }", "simulate.wind.velocity|out of range|m/s"),
+        ("frction = 0.3", "did you mean `friction`?"),
+    ] {
+        corpus.refuse_edit(SHOT, "target = \"off\"", &simulate(text), &format!("pipeline.toml, line|{words}"));
+    }
+    corpus.refuse_edit(SHOT, "target = \"off\"", "target = \"every-hairs\"", "did you mean `every-hair`?");
+    corpus.refuse_edit(SHOT, "fps =", "preroll = -1\nfps =", "pipeline.toml, line|preroll|expected u32");
+    corpus.refuse_edit(SHOT, "fps =", "preroll = 1000000\nfps =", "pipeline.toml, line|shot.preroll|help:");
+    for (text, words) in [
+        ("material = { young = 3 }", "unknown field `young`|did you mean `young_gpa`?"),
+        ("material = { young_gpa = 0 }", "layer[1].material.young_gpa|out of range|help:"),
+        ("material = { density = 0 }", "layer[1].material.density|out of range|help:"),
+        ("material = { poisson = 0.7 }", "layer[1].material.poisson|out of range|help:"),
+        ("material = { diameter = nan }", "layer[1].material.diameter|out of range|help:"),
+        ("simulate = \"guides\"", "unknown variant `guides`"),
+    ] {
+        corpus.refuse_edit(
+            GROOM,
+            "name = \"over\"",
+            &format!("name = \"over\"\n{text}"),
+            &format!("ball.toml, line|{words}"),
+        );
+    }
+    corpus.finish();
+}
+
+#[test]
 fn values_out_of_range_in_the_groom() {
     let mut corpus = Corpus::new();
     for (from, to, words) in [

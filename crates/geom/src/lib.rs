@@ -9,6 +9,7 @@ pub mod map;
 pub mod mesh;
 pub mod motion;
 pub mod pose;
+pub mod ride;
 pub mod rng;
 pub mod shapes;
 pub mod strands;

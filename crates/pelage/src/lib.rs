@@ -12,5 +12,6 @@ pub mod project;
 pub mod report;
 pub mod sample;
 pub mod stage;
+pub mod timeline;
 
 pub use error::Error;

@@ -67,6 +67,22 @@ impl Progress {
         }
     }
 
+    /// A line of its own about the stage.
+    pub fn say_of_stage(&self, line: &str) {
+        self.say(&format!("{:<12} {line}", self.stage));
+    }
+
+    /// Shows the fraction done of something that takes long, on a terminal; it may be called from any thread. Always true.
+    pub fn ticker(&self, what: &str) -> impl Fn(f64) -> bool + Sync + use<> {
+        let (bar, what) = (self.bar.clone(), what.to_owned());
+        move |done| {
+            if let Some(bar) = bar.as_ref().filter(|_| done < 1.0) {
+                bar.set_message(format!("{what} {:.0} %", 100.0 * done));
+            }
+            true
+        }
+    }
+
     /// A line of its own.
     pub fn say(&self, line: &str) {
         match &self.bar {

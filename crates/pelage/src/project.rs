@@ -2,14 +2,22 @@
 
 use crate::Error;
 use crate::cache::FileHashes;
-use crate::config::{Document, Feature, GroomFile, ShotFile};
+use crate::config::{Document, Feature, GroomFile, SEGMENTS, ShotFile, Target};
 use crate::format::csv;
+use pelage_geom::RigidMotion;
 use pelage_geom::motion::RigidTransform;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Farthest that a skin may be from the scene's origin, scene units: what single precision can still square.
 const FARTHEST: f64 = 1e18;
+
+/// Frames of pre-roll where the shot does not say: half a second, in which hair that was set in motion by the way from the
+/// rest pose comes to follow the skin. Half as many show that way in the first frames; twice as many cost as much as half
+/// a second of film more.
+const PREROLL: u32 = 12;
+
+type Frames = BTreeMap<i32, SkinAt>;
 
 /// An input file and what is in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -33,6 +41,32 @@ pub enum SkinAt {
     File(InputFile),
 }
 
+/// A skin that moves as a whole.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SkinMotion {
+    /// The table.
+    pub file: InputFile,
+    /// Its samples, scene units.
+    pub motion: RigidMotion,
+    /// The frame at which its time is 0.
+    pub start: f64,
+    /// Point that rotations leave in place, scene units.
+    pub pivot: [f64; 3],
+    fps: f64,
+}
+
+impl SkinMotion {
+    /// Time in the table at a frame number, seconds.
+    pub fn seconds(&self, frame: f64) -> f64 {
+        (frame - self.start) / self.fps
+    }
+
+    /// Placement at a frame number, which may lie between frames.
+    pub fn at(&self, frame: f64) -> RigidTransform {
+        self.motion.at(self.seconds(frame), self.pivot)
+    }
+}
+
 /// A shot with its input files.
 #[derive(Debug)]
 pub struct Project {
@@ -46,6 +80,10 @@ pub struct Project {
     pub drawn: Option<InputFile>,
     /// The skin at every frame of the shot.
     pub frames: BTreeMap<i32, SkinAt>,
+    /// The skin at frames of the pre-roll that a sequence has files for.
+    pub before: BTreeMap<i32, SkinAt>,
+    /// The motion of a skin that moves as a whole.
+    pub motion: Option<SkinMotion>,
     /// Every map, by the path written in the groom file: UDIM number (0 without tiles) and file.
     pub maps: BTreeMap<PathBuf, Vec<(u32, InputFile)>>,
 }
@@ -69,9 +107,14 @@ impl Project {
         let groom: Document<GroomFile> = Document::read(&groom_path)?;
         groom.check()?;
         let mut hashes = FileHashes::open(&shot.resolve(&shot.value.cache.dir));
-        let mut find = Finder { base: shot.path.parent().unwrap_or(Path::new("")).to_path_buf(), hashes: &mut hashes };
+        let base = shot.path.parent().unwrap_or(Path::new("")).to_path_buf();
+        let simulated =
+            groom.value.layer.iter().any(|l| l.simulate.unwrap_or(shot.value.simulate.target) != Target::Off);
+        let preroll = if simulated { preroll(&shot.value) } else { 0 };
+        let mut find = Finder { base, hashes: &mut hashes, preroll };
         let rest = find.file(&shot, "skin.rest", &shot.value.skin.rest)?;
-        let frames = find.frames(&shot)?;
+        let motion = find.motion(&shot)?;
+        let [frames, before] = find.frames(&shot, motion.as_ref())?;
         let drawn = groom.value.control.placement.curves.as_ref();
         let drawn = drawn.map(|p| find.file(&groom, "control.placement.curves", p)).transpose()?;
         let mut maps = BTreeMap::new();
@@ -82,7 +125,7 @@ impl Project {
             }
         }
         hashes.save();
-        Ok(Project { shot, groom, rest, drawn, frames, maps })
+        Ok(Project { shot, groom, rest, drawn, frames, before, motion, maps })
     }
 
     /// Folder of the shot's outputs.
@@ -128,10 +171,34 @@ impl Project {
         (format!("layer[{longest}].length"), length)
     }
 
+    /// What is simulated of a layer.
+    pub fn target(&self, i: usize) -> Target {
+        self.groom.value.layer[i].simulate.unwrap_or(self.shot.value.simulate.target)
+    }
+
+    /// Points of a hair of a layer in the finished frames.
+    pub fn points(&self, i: usize) -> usize {
+        let groom = &self.groom.value;
+        match self.target(i) {
+            Target::EveryHair => self.segments() + 1,
+            _ => groom.layer[i].points.unwrap_or(groom.control.points),
+        }
+    }
+
+    /// Segments of a simulated hair.
+    pub fn segments(&self) -> usize {
+        self.shot.value.simulate.segments.unwrap_or(SEGMENTS)
+    }
+
     /// A path for people: relative to the shot file's folder where it lies below it.
     pub fn label(&self, path: &Path) -> String {
         label(self.shot.path.parent().unwrap_or(Path::new("")), path)
     }
+}
+
+/// Frames that are simulated before the first.
+pub fn preroll(shot: &ShotFile) -> u32 {
+    shot.shot.preroll.unwrap_or(PREROLL)
 }
 
 fn label(base: &Path, path: &Path) -> String {
@@ -165,6 +232,8 @@ fn named_maps(groom: &GroomFile) -> Vec<(String, PathBuf)> {
 struct Finder<'a> {
     base: PathBuf,
     hashes: &'a mut FileHashes,
+    /// Frames before the first that are looked for.
+    preroll: u32,
 }
 
 impl Finder<'_> {
@@ -198,25 +267,33 @@ impl Finder<'_> {
         Ok(tiles)
     }
 
-    fn frames(&mut self, doc: &Document<ShotFile>) -> Result<BTreeMap<i32, SkinAt>, Error> {
+    fn motion(&mut self, doc: &Document<ShotFile>) -> Result<Option<SkinMotion>, Error> {
+        let (skin, shot) = (&doc.value.skin, &doc.value.shot);
+        let Some(path) = &skin.motion else { return Ok(None) };
+        let file = self.file(doc, "skin.motion", path)?;
+        let motion = csv::read_motion(&file.path, shot.meters_per_unit, shot.fps)?;
+        let start = skin.motion_start.unwrap_or(f64::from(shot.frames[0]));
+        Ok(Some(SkinMotion { file, motion, start, pivot: skin.pivot, fps: shot.fps }))
+    }
+
+    /// The skin at every frame of the shot, and at those of the pre-roll that there are files for.
+    fn frames(&mut self, doc: &Document<ShotFile>, motion: Option<&SkinMotion>) -> Result<[Frames; 2], Error> {
         let (skin, shot) = (&doc.value.skin, &doc.value.shot);
         let range = shot.frames[0]..=shot.frames[1];
-        if let Some(path) = &skin.motion {
-            let file = self.file(doc, "skin.motion", path)?;
-            let motion = csv::read_motion(&file.path, shot.meters_per_unit, shot.fps)?;
-            let start = skin.motion_start.unwrap_or(f64::from(shot.frames[0]));
+        if let Some(m) = motion {
+            let near = |t: &RigidTransform| t.translation.iter().chain(&t.pivot).all(|x| x.abs() <= FARTHEST);
             let at = |f: i32| {
-                let t = motion.at((f64::from(f) - start) / shot.fps, skin.pivot);
-                if t.translation.iter().chain(&t.pivot).all(|x| x.abs() <= FARTHEST) {
+                let t = m.at(f64::from(f));
+                if near(&t) {
                     return Ok((f, SkinAt::Rigid(t)));
                 }
-                let what = format!("{} moves the skin out of all bounds at frame {f}", file.label);
+                let what = format!("{} moves the skin out of all bounds at frame {f}", m.file.label);
                 Err(doc.error("skin.motion", what, "translations are in metres; check skin.pivot too").into())
             };
-            return range.map(at).collect();
+            return Ok([range.map(at).collect::<Result<_, Error>>()?, Frames::new()]);
         }
         let Some(pattern) = &skin.frames else {
-            return Ok(range.map(|f| (f, SkinAt::Rest)).collect());
+            return Ok([range.map(|f| (f, SkinAt::Rest)).collect(), Frames::new()]);
         };
         let pattern = doc.resolve(pattern);
         let text = pattern.to_string_lossy().into_owned();
@@ -229,7 +306,12 @@ impl Finder<'_> {
             let what = format!("{} has no file for frame {}", pattern.display(), frame_list(&gone));
             return Err(doc.error("skin.frames", what, "every frame of the shot needs a file").into());
         }
-        range.map(|f| Ok((f, SkinAt::File(self.found(doc, "skin.frames", files[&i64::from(f)].clone())?)))).collect()
+        let early = shot.frames[0].saturating_sub(i32::try_from(self.preroll).unwrap_or(i32::MAX));
+        let mut of = |range: &mut dyn Iterator<Item = i32>| -> Result<Frames, Error> {
+            let files = range.filter_map(|f| Some((f, files.get(&i64::from(f))?)));
+            files.map(|(f, file)| Ok((f, SkinAt::File(self.found(doc, "skin.frames", file.clone())?)))).collect()
+        };
+        Ok([of(&mut range.clone())?, of(&mut (early..*range.start()))?])
     }
 }
 

@@ -4,10 +4,12 @@
 //! <cache>/v1/entries/<ab>/<key>/manifest.json   recipe and the hash of every payload file; written last
 //!                              /<payload files>
 //! <cache>/v1/tmp/                                entries being written
+//! <cache>/v1/unfinished/                         steps that take long, see `long_step`
 //! <cache>/v1/last/<shot>.json                    the recipe that each step of a shot last had, for reasons
 //! <cache>/lock                                   shared by runs, exclusive for pruning
 //! ```
 
+use super::long_step::{self, LongStep};
 use super::recipe::{Key, Recipe};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -18,10 +20,21 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A payload file of an entry.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-struct Payload {
-    name: String,
+pub(super) struct Payload {
+    pub name: String,
     bytes: u64,
     blake3: String,
+}
+
+impl Payload {
+    pub fn new(name: &str, content: &[u8]) -> Self {
+        let blake3 = blake3::hash(content).to_hex().to_string();
+        Payload { name: name.to_owned(), bytes: content.len() as u64, blake3 }
+    }
+
+    pub fn matches(&self, content: &[u8]) -> bool {
+        content.len() as u64 == self.bytes && blake3::hash(content).to_hex().as_str() == self.blake3
+    }
 }
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -73,17 +86,30 @@ impl Store {
         std::fs::create_dir_all(root.join("tmp"))?;
         std::fs::create_dir_all(root.join("last"))?;
         let lock = File::options().create(true).truncate(false).write(true).open(cache.join("lock"))?;
-        if lock.try_lock().is_ok() {
+        let alone = lock.try_lock().is_ok();
+        if alone {
             for left in std::fs::read_dir(root.join("tmp"))?.flatten() {
                 let _ = std::fs::remove_dir_all(left.path());
             }
             for folder in [cache, &root.join("last")].iter().chain(folders) {
                 crate::files::clear_unfinished(folder);
             }
-            lock.unlock()?;
         }
-        lock.lock_shared()?;
-        Ok(Store { root, lock, warnings: Default::default() })
+        let store = Store { root, lock, warnings: Default::default() };
+        if alone {
+            for (key, folder) in long_step::folders(&store.root) {
+                if store.contains(&key) || !folder.join("lock").exists() {
+                    long_step::clear(&folder);
+                }
+            }
+            store.lock.unlock()?;
+        }
+        store.lock.lock_shared()?;
+        Ok(store)
+    }
+
+    pub(super) fn root(&self) -> &Path {
+        &self.root
     }
 
     fn folder(&self, key: &Key) -> PathBuf {
@@ -122,7 +148,7 @@ impl Store {
         let mut payload = Vec::new();
         for p in &m.payload {
             match std::fs::read(folder.join(&p.name)) {
-                Ok(bytes) if blake3::hash(&bytes).to_hex().as_str() == p.blake3 => payload.push(bytes),
+                Ok(bytes) if p.matches(&bytes) => payload.push(bytes),
                 _ => {
                     self.warn(format!("cache entry {} ({}) is damaged; its step runs again", key.0, m.recipe.stage));
                     return None;
@@ -130,6 +156,23 @@ impl Store {
             }
         }
         Some(Entry { counts: m.counts, payload })
+    }
+
+    /// Reads one payload file of a finished step and checks it; damage is a miss with a warning.
+    pub fn file(&self, key: &Key, name: &str) -> Option<Vec<u8>> {
+        let m = self.manifest(key)?;
+        let p = m.payload.iter().find(|p| p.name == name)?;
+        let bytes = std::fs::read(self.folder(key).join(name)).ok().filter(|b| p.matches(b));
+        if bytes.is_none() {
+            self.warn(format!("cache entry {} ({}) is damaged; its step runs again", key.0, m.recipe.stage));
+        }
+        bytes
+    }
+
+    /// Goes on with what a killed run left of a long step, or begins; `anew` begins in any case.
+    pub fn long_step(&self, recipe: &Recipe, anew: bool) -> io::Result<LongStep> {
+        let n = TEMPORARY.fetch_add(1, Ordering::Relaxed);
+        LongStep::open(&self.root, recipe, &format!("{}-{n}", std::process::id()), anew)
     }
 
     /// Keeps a finished step: written beside, manifest last, renamed. If another run was first, its entry stays,
@@ -141,29 +184,43 @@ impl Store {
         std::fs::create_dir_all(&tmp)?;
         let mut payload = Vec::new();
         for (name, bytes) in files {
-            let mut file = File::create(tmp.join(name))?;
-            file.write_all(bytes)?;
-            let blake3 = blake3::hash(bytes).to_hex().to_string();
-            payload.push(Payload { name: (*name).to_owned(), bytes: bytes.len() as u64, blake3 });
+            File::create(tmp.join(name))?.write_all(bytes)?;
+            payload.push(Payload::new(name, bytes));
         }
-        let manifest = Manifest { key: key.clone(), recipe: recipe.clone(), counts, payload };
-        std::fs::write(tmp.join("manifest.json"), serde_json::to_vec_pretty(&manifest).expect("plain JSON"))?;
-        let place = self.folder(&key);
+        self.write_manifest(&tmp, recipe, counts, payload)?;
+        self.place(&tmp, &key)?;
+        Ok(key)
+    }
+
+    pub(super) fn write_manifest(
+        &self,
+        folder: &Path,
+        recipe: &Recipe,
+        counts: BTreeMap<String, u64>,
+        payload: Vec<Payload>,
+    ) -> io::Result<()> {
+        let manifest = Manifest { key: recipe.key(), recipe: recipe.clone(), counts, payload };
+        std::fs::write(folder.join("manifest.json"), serde_json::to_vec_pretty(&manifest).expect("plain JSON"))
+    }
+
+    /// Renames a folder that is whole into its place.
+    pub(super) fn place(&self, tmp: &Path, key: &Key) -> io::Result<()> {
+        let place = self.folder(key);
         std::fs::create_dir_all(place.parent().expect("entries have a parent"))?;
-        if std::fs::rename(&tmp, &place).is_err() {
+        if std::fs::rename(tmp, &place).is_err() {
             // A damaged entry is in the way, or another run's whole one with the same bytes.
-            if self.get(&key).is_none() {
+            if self.get(key).is_none() {
                 let aside = tmp.with_extension("old");
                 let _ = std::fs::rename(&place, &aside);
                 let _ = std::fs::remove_dir_all(&aside);
-                if std::fs::rename(&tmp, &place).is_err() && self.get(&key).is_none() {
-                    let _ = std::fs::remove_dir_all(&tmp);
+                if std::fs::rename(tmp, &place).is_err() && self.get(key).is_none() {
+                    let _ = std::fs::remove_dir_all(tmp);
                     return Err(io::Error::other(format!("can't move the cache entry to {}", place.display())));
                 }
             }
-            let _ = std::fs::remove_dir_all(&tmp);
+            let _ = std::fs::remove_dir_all(tmp);
         }
-        Ok(key)
+        Ok(())
     }
 
     fn warn(&self, text: String) {
@@ -217,6 +274,10 @@ impl Store {
                 None => stats.damaged.push(key.0),
             }
         }
+        for (_, folder) in long_step::folders(&self.root) {
+            let at = stats.stages.entry("unfinished".to_owned()).or_default();
+            (at.0, at.1) = (at.0 + 1, at.1 + folder_bytes(&folder));
+        }
         Ok(stats)
     }
 
@@ -240,8 +301,12 @@ impl Store {
                 continue;
             }
             let folder = self.folder(&key);
-            let sizes = std::fs::read_dir(&folder)?.flatten().filter_map(|f| f.metadata().ok());
-            bytes += sizes.map(|m| m.len()).sum::<u64>();
+            bytes += folder_bytes(&folder);
+            entries += 1;
+            std::fs::remove_dir_all(&folder)?;
+        }
+        for (_, folder) in long_step::folders(&self.root) {
+            bytes += folder_bytes(&folder);
             entries += 1;
             std::fs::remove_dir_all(&folder)?;
         }
@@ -249,6 +314,11 @@ impl Store {
         self.lock.lock_shared()?;
         Ok(Some((entries, bytes)))
     }
+}
+
+fn folder_bytes(folder: &Path) -> u64 {
+    let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    files.filter_map(|f| f.metadata().ok()).map(|m| m.len()).sum()
 }
 
 #[cfg(test)]

@@ -189,6 +189,11 @@ fn inspect_mcap(file: &Path) -> Result<Value, Error> {
         let points: Vec<usize> = layers.iter().map(Vec::len).collect();
         return Ok(json!({"kind": "cached frame", "points": points, "x": axis(0), "y": axis(1), "z": axis(2)}));
     }
+    if let Ok(bytes) = std::fs::read(file)
+        && let Ok(state) = mcap::read_state_payload(&bytes)
+    {
+        return Ok(json!({"kind": "simulation state", "bytes": state.len()}));
+    }
     let summary = mcap::inspect(file)?;
     Ok(json!({"kind": "MCAP", "content": format!("{summary:#?}")}))
 }

@@ -1,6 +1,7 @@
 //! The groom file: control hairs, how they are combed, and the layers of hair grown from maps.
 
 use super::document::{ConfigError, Document, Fixed, exactly};
+use super::simulate::{Material, Target, check_material};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer};
 use std::path::PathBuf;
@@ -301,8 +302,14 @@ pub struct Layer {
     /// Colour. Default: brown.
     #[serde(default = "default_color")]
     pub color: ColorFeature,
-    /// Points of a hair, the root included. Default: as many as the control hairs have.
+    /// Points of a hair, the root included; hairs simulated one by one have `simulate.segments` + 1 instead. Default: as
+    /// many as the control hairs have.
     pub points: Option<usize>,
+    /// What the hair is made of when it is simulated.
+    #[serde(default)]
+    pub material: Material,
+    /// What is simulated of this layer. Default: what the shot says.
+    pub simulate: Option<Target>,
 }
 
 fn default_width() -> WidthFeature {
@@ -390,6 +397,7 @@ impl Document<GroomFile> {
             self.within(&format!("{key}.color.value[{i}]"), *x, 0.0, 1e3)?;
         }
         self.within(&format!("{key}.color.noise"), l.color.noise, 0.0, 1.0)?;
+        check_material(self, &format!("{key}.material"), &l.material)?;
         self.points(&format!("{key}.points"), l.points)
     }
 

@@ -3,6 +3,7 @@
 mod document;
 mod groom;
 mod shot;
+mod simulate;
 
 pub use document::{ConfigError, Document};
 pub use groom::{
@@ -10,6 +11,9 @@ pub use groom::{
 };
 pub use groom::{Side, Space, WidthFeature, WrapMode};
 pub use shot::{CacheSettings, Export, ExportFormat, GroomRef, Preview, Shot, ShotFile, Skin, UpAxis};
+pub use simulate::{
+    Amount, Key, Keyed, Material, SEGMENTS, Simulate, StrandModel, Target, Vector, WindSettings, check_material,
+};
 
 /// JSON Schema (draft 2020-12) of a shot file or a groom file, for editors.
 pub fn schema<T: schemars::JsonSchema>() -> String {

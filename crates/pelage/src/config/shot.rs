@@ -1,6 +1,7 @@
 //! The shot file, `pipeline.toml`.
 
 use super::document::{ConfigError, Document, exactly};
+use super::simulate::Simulate;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::path::PathBuf;
@@ -15,6 +16,9 @@ pub struct ShotFile {
     pub skin: Skin,
     /// The look.
     pub groom: GroomRef,
+    /// How hair is simulated.
+    #[serde(default)]
+    pub simulate: Simulate,
     /// Files to write.
     #[serde(default)]
     pub export: Export,
@@ -42,6 +46,8 @@ pub struct Shot {
     /// The axis that points up. Default: "y".
     #[serde(default)]
     pub up: UpAxis,
+    /// Frames that are simulated before the first one, from the rest pose on. Default: 12.
+    pub preroll: Option<u32>,
 }
 
 /// The axis that points up.
@@ -168,6 +174,9 @@ impl Document<ShotFile> {
         if !(1e-9..=1e9).contains(&s.shot.meters_per_unit) {
             return bad("shot.meters_per_unit", "must be between 1e-9 and 1e9", "1 for metres, 0.01 for centimetres");
         }
+        if s.shot.preroll.is_some_and(|n| n > 100_000) {
+            return bad("shot.preroll", "is more than 100000 frames", "12 is usual");
+        }
         if s.skin.motion.is_some() && s.skin.frames.is_some() {
             return bad("skin.motion", "can't go together with skin.frames", "keep one of the two");
         }
@@ -203,6 +212,6 @@ impl Document<ShotFile> {
         if !(1..=100).contains(&s.preview.sheet) {
             return bad("preview.sheet", "must be between 1 and 100 pictures", "");
         }
-        Ok(())
+        self.check_simulate()
     }
 }

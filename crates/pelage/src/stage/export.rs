@@ -99,7 +99,7 @@ pub fn look(run: &mut Runner<'_>, i: usize) -> Result<HairLayer, Error> {
     let opacity = instance::column(run, What::Opacity(i), i)?;
     let color = instance::color(run, i)?;
     let groom = &run.project.groom.value;
-    let points = groom.layer[i].points.unwrap_or(groom.control.points);
+    let points = run.project.points(i);
     let unit_per_micrometre = (1e-6 / run.project.shot.value.shot.meters_per_unit) as f32;
     let tip = groom.layer[i].width.tip as f32;
     let taper: Vec<f32> = (0..points).map(|k| 1.0 + (tip - 1.0) * (k as f32 / (points - 1) as f32)).collect();

@@ -1,12 +1,15 @@
 //! Interpolate: every hair at every frame, from control hairs on the skin of that frame.
 
 use super::run::{Counts, Runner};
-use super::{What, groom, instance};
+use super::{What, groom, instance, simulate};
 use crate::Error;
+use crate::config::Target;
 use crate::format::mcap;
 use crate::project::SkinAt;
+use pelage_geom::Vec3;
 use pelage_groom::instance::Roots;
-use pelage_groom::interpolate::{Blend, interpolate, pose_controls, root_positions};
+use pelage_groom::interpolate::{Blend, ControlPose, interpolate, pose_controls, root_positions};
+use rayon::prelude::*;
 use std::rc::Rc;
 
 /// What the interpolator reads of a layer, one entry a hair.
@@ -31,8 +34,7 @@ fn layer(run: &mut Runner<'_>, i: usize) -> Result<Rc<LayerHairs>, Error> {
     let roots = instance::roots(run, i)?;
     let (hair, weight) = instance::weights(run, i)?;
     let length = instance::column(run, What::Length(i), i)?;
-    let groom = &run.project.groom.value;
-    let points = groom.layer[i].points.unwrap_or(groom.control.points);
+    let points = run.project.points(i);
     if u32::try_from(roots.id.len() * points).is_err() {
         let what = format!("{} hairs of {points} points are more than 2^32 points", roots.id.len());
         let help = "lower the density or the points, or make two layers of it";
@@ -56,19 +58,15 @@ pub fn positions(run: &mut Runner<'_>, what: What) -> Result<Vec<[f32; 3]>, Erro
     {
         return Ok(first);
     }
-    let skin = groom::skin(run)?;
-    let control = groom::combed(run)?;
-    let layer = layer(run, i)?;
-    let pose = skin.pose(&at)?;
-    let control = pose_controls(&control, &skin.mesh, &skin.topology, &pose, layer.points);
-    let root = root_positions(&skin.mesh, &pose, &layer.roots.root, skin.origin());
-    let blend = Blend { root: &root, hair: &layer.hair, weight: &layer.weight, length: &layer.length };
-    let mut out = vec![[0.0f32; 3]; layer.roots.id.len() * layer.points];
-    let found = interpolate(&blend, &control, &mut out);
+    let (out, cancelled) = match (what, run.project.target(i)) {
+        (What::Frame(_, f), Target::EveryHair) => (simulate::positions(run, i, f)?, 0),
+        _ => blended(run, what, i, &at)?,
+    };
+    let hairs = instance::roots(run, i)?.id.len();
     let counts = Counts::from([
-        ("hairs".to_owned(), layer.roots.id.len() as u64),
+        ("hairs".to_owned(), hairs as u64),
         ("points".to_owned(), out.len() as u64),
-        ("hairs with cancelled directions".to_owned(), found.cancelled_hairs as u64),
+        ("hairs with cancelled directions".to_owned(), cancelled as u64),
     ]);
     let name = run.plan.step(what).name.clone();
     let frame = if let What::Frame(_, f) = what { f } else { 0 };
@@ -76,4 +74,24 @@ pub fn positions(run: &mut Runner<'_>, what: What) -> Result<Vec<[f32; 3]>, Erro
     mcap::write_frame_payload(&mut file, &name, frame, &[&out]).expect("writing to memory does not fail");
     run.keep(what, counts, &[("frame.mcap", file.get_ref())])?;
     Ok(out)
+}
+
+/// Hairs blended from control hairs, and how many had directions that cancelled.
+fn blended(run: &mut Runner<'_>, what: What, i: usize, at: &SkinAt) -> Result<(Vec<[f32; 3]>, usize), Error> {
+    let skin = groom::skin(run)?;
+    let layer = layer(run, i)?;
+    let pose = skin.pose(at)?;
+    let control = match (what, run.project.target(i)) {
+        (What::Frame(_, f), Target::ControlHairs) => {
+            let simulated = simulate::positions(run, i, f)?;
+            let lines: Vec<Vec3> = simulated.par_iter().map(|p| Vec3::from(p.map(f64::from))).collect();
+            ControlPose::from_polylines(&lines, run.project.segments() + 1, layer.points)
+        }
+        _ => pose_controls(&*groom::combed(run)?, &skin.mesh, &skin.topology, &pose, layer.points),
+    };
+    let root = root_positions(&skin.mesh, &pose, &layer.roots.root, skin.origin());
+    let blend = Blend { root: &root, hair: &layer.hair, weight: &layer.weight, length: &layer.length };
+    let mut out = vec![[0.0f32; 3]; layer.roots.id.len() * layer.points];
+    let found = interpolate(&blend, &control, &mut out);
+    Ok((out, found.cancelled_hairs))
 }

@@ -2,6 +2,7 @@
 //! write.
 
 mod plan;
+mod plan_simulate;
 mod run;
 mod skin;
 
@@ -10,6 +11,7 @@ pub mod groom;
 pub mod instance;
 pub mod interpolate;
 pub mod preview;
+pub mod simulate;
 pub mod tables;
 
 pub use plan::{Plan, Step, What, candidate_density, layer_seed};
@@ -24,6 +26,8 @@ pub enum Stage {
     Groom,
     /// Roots, weights and features of every hair; once per groom.
     Instance,
+    /// Hair in motion, one stretch of frames after another.
+    Simulate,
     /// Every hair at every frame.
     Interpolate,
     /// Files for other programs.
@@ -34,13 +38,15 @@ pub enum Stage {
 
 impl Stage {
     /// All stages in order.
-    pub const ALL: [Stage; 5] = [Stage::Groom, Stage::Instance, Stage::Interpolate, Stage::Export, Stage::Preview];
+    pub const ALL: [Stage; 6] =
+        [Stage::Groom, Stage::Instance, Stage::Simulate, Stage::Interpolate, Stage::Export, Stage::Preview];
 
     /// Name as typed on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Stage::Groom => "groom",
             Stage::Instance => "instance",
+            Stage::Simulate => "simulate",
             Stage::Interpolate => "interpolate",
             Stage::Export => "export",
             Stage::Preview => "preview",

@@ -2,8 +2,9 @@
 
 use super::Stage;
 use crate::cache::{Field, Recipe};
-use crate::config::{Comb, ExportFormat, Feature, MapRef, Parting};
+use crate::config::{Comb, ExportFormat, Feature, MapRef, Parting, Target};
 use crate::project::{Project, SkinAt, frame_list};
+use crate::timeline::Timeline;
 use std::collections::BTreeMap;
 
 /// What a step makes. Layers are numbered as in the groom file.
@@ -29,6 +30,8 @@ pub enum What {
     Color(usize),
     /// A layer's hairs at the rest pose.
     Rest(usize),
+    /// What is simulated of a layer over a stretch of frames between checkpoints.
+    Simulate(usize, u32),
     /// A layer's hairs at a frame.
     Frame(usize, i32),
     /// An exported file, or one per frame.
@@ -63,13 +66,14 @@ pub struct Plan {
 }
 
 /// Versions of the stages' results. Raise one whenever its code gives other bytes for the same input.
-mod version {
+pub(super) mod version {
     pub const PLACE: u32 = 1;
     pub const COMB: u32 = 1;
     pub const CANDIDATES: u32 = 1;
     pub const ROOTS: u32 = 1;
     pub const WEIGHTS: u32 = 1;
     pub const COLUMN: u32 = 1;
+    pub const SIMULATE: u32 = 1;
     pub const INTERPOLATE: u32 = 1;
     pub const EXPORT: u32 = 1;
     pub const PREVIEW: u32 = 2;
@@ -96,7 +100,7 @@ impl Plan {
     /// Plans a shot.
     pub fn new(project: &Project) -> Self {
         let mut plan = Plan { steps: Vec::new(), index: BTreeMap::new() };
-        let r = Reader { project, groom: project.label(&project.groom.path), shot: project.label(&project.shot.path) };
+        let r = Reader::new(project);
         plan.add(What::Place, "groom/place".into(), Stage::Groom, r.place(), &[]);
         plan.add(What::Comb, "groom/comb".into(), Stage::Groom, r.comb(), &[What::Place]);
         for (i, layer) in project.groom.value.layer.iter().enumerate() {
@@ -127,13 +131,26 @@ impl Plan {
         for (i, layer) in project.groom.value.layer.iter().enumerate() {
             let reads = [What::Comb, What::Roots(i), What::Weights(i), What::Length(i)];
             let name = format!("interpolate/{}/rest", layer.name);
-            plan.add(What::Rest(i), name, Stage::Interpolate, r.frame(i, &SkinAt::Rest, 0), &reads);
+            let rest = Recipe::new("interpolate", version::INTERPOLATE);
+            let rest = r.skin(r.points(i, rest), &SkinAt::Rest, 0);
+            plan.add(What::Rest(i), name, Stage::Interpolate, rest, &reads);
+        }
+        let timeline = Timeline::new(project);
+        for i in (0..project.groom.value.layer.len()).filter(|i| project.target(*i) != Target::Off) {
+            for k in 0..timeline.stretches() {
+                plan.add_stretch(&r, &timeline, i, k);
+            }
         }
         for (frame, at) in &project.frames {
             for (i, layer) in project.groom.value.layer.iter().enumerate() {
-                let reads = [What::Comb, What::Roots(i), What::Weights(i), What::Length(i)];
+                let simulated = What::Simulate(i, timeline.stretch_of(*frame));
+                let reads: &[What] = match project.target(i) {
+                    Target::EveryHair => &[simulated],
+                    Target::ControlHairs => &[simulated, What::Roots(i), What::Weights(i), What::Length(i)],
+                    Target::Off => &[What::Comb, What::Roots(i), What::Weights(i), What::Length(i)],
+                };
                 let name = format!("interpolate/{}/{frame}", layer.name);
-                plan.add(What::Frame(i, *frame), name, Stage::Interpolate, r.frame(i, at, *frame), &reads);
+                plan.add(What::Frame(i, *frame), name, Stage::Interpolate, r.frame(i, at, *frame), reads);
             }
         }
         let layers = 0..project.groom.value.layer.len();
@@ -165,8 +182,12 @@ impl Plan {
             let step = self.step(*input);
             recipe = recipe.step(&step.name.clone(), &step.recipe.key());
         }
-        self.index.insert(what, self.steps.len());
-        self.steps.push(Step { what, name, stage, recipe, reads: reads.to_vec() });
+        self.push(Step { what, name, stage, recipe, reads: reads.to_vec() });
+    }
+
+    pub(super) fn push(&mut self, step: Step) {
+        self.index.insert(step.what, self.steps.len());
+        self.steps.push(step);
     }
 
     /// The step that makes something. Panics if the shot has no such step.
@@ -179,7 +200,7 @@ impl Plan {
         let step = self.step(what);
         let mut out = match last.get(&step.name) {
             Some(before) if before.key() == step.recipe.key() => return Vec::new(),
-            Some(before) => step.recipe.changes(before),
+            Some(before) => changes(&step.recipe, before),
             None => Vec::new(),
         };
         for input in &step.reads {
@@ -193,11 +214,25 @@ impl Plan {
     }
 }
 
+/// What changed between two recipes of a step. Frames that only one of them has say nothing: the range of frames does;
+/// nor does what another target reads.
+fn changes(now: &Recipe, before: &Recipe) -> Vec<String> {
+    let target = |r: &Recipe| r.fields.iter().find(|f| f.name == "target").map(|f| f.value.clone());
+    let other = target(now) != target(before);
+    let only = |r: &Recipe, o: &Recipe| {
+        let of_both = |f: &&Field| !f.name.starts_with("skin.") || o.fields.iter().any(|g| g.name == f.name);
+        let told = |f: &&Field| if other { f.name == "target" } else { of_both(f) };
+        Recipe { fields: r.fields.iter().filter(told).cloned().collect(), ..r.clone() }
+    };
+    only(now, before).changes(&only(before, now))
+}
+
 impl What {
     /// The layer that it belongs to, if it belongs to one.
     pub fn layer(self) -> Option<usize> {
         match self {
-            What::Candidates(i) | What::Roots(i) | What::Weights(i) | What::Rest(i) | What::Frame(i, _) => Some(i),
+            What::Candidates(i) | What::Roots(i) | What::Weights(i) | What::Rest(i) => Some(i),
+            What::Simulate(i, _) | What::Frame(i, _) => Some(i),
             What::Length(i) | What::Width(i) | What::Opacity(i) | What::Color(i) => Some(i),
             What::Place | What::Comb | What::Export(_) | What::Still | What::Sheet => None,
         }
@@ -216,27 +251,31 @@ impl ExportFormat {
 }
 
 /// Builds recipes from a project; `groom` and `shot` are the files' labels.
-struct Reader<'a> {
-    project: &'a Project,
+pub(super) struct Reader<'a> {
+    pub project: &'a Project,
     groom: String,
     shot: String,
 }
 
-impl Reader<'_> {
-    fn in_groom(&self, key: &str) -> String {
+impl<'a> Reader<'a> {
+    pub(super) fn new(project: &'a Project) -> Self {
+        Reader { project, groom: project.label(&project.groom.path), shot: project.label(&project.shot.path) }
+    }
+
+    pub(super) fn in_groom(&self, key: &str) -> String {
         format!("{}: {key}", self.groom)
     }
 
-    fn in_shot(&self, key: &str) -> String {
+    pub(super) fn in_shot(&self, key: &str) -> String {
         format!("{}: {key}", self.shot)
     }
 
-    fn rest(&self, recipe: Recipe) -> Recipe {
+    pub(super) fn rest(&self, recipe: Recipe) -> Recipe {
         recipe.file("rest", &self.project.rest.hash, self.project.rest.label.clone())
     }
 
     /// Scale between scene units and the units of a groom file.
-    fn unit(&self, recipe: Recipe) -> Recipe {
+    pub(super) fn unit(&self, recipe: Recipe) -> Recipe {
         let unit = self.project.shot.value.shot.meters_per_unit;
         recipe.param("meters_per_unit", unit, self.in_shot("shot.meters_per_unit"))
     }
@@ -354,17 +393,37 @@ impl Reader<'_> {
         r.with(map.iter().flat_map(|m| self.map("color", m)))
     }
 
+    fn points(&self, i: usize, r: Recipe) -> Recipe {
+        let label = match self.project.target(i) {
+            Target::EveryHair => self.in_shot("simulate.segments (points)"),
+            _ => self.in_groom(&format!("layer[{i}].points")),
+        };
+        r.param("points", self.project.points(i), label)
+    }
+
     fn frame(&self, i: usize, at: &SkinAt, frame: i32) -> Recipe {
-        let layer = &self.project.groom.value.layer[i];
-        let points = layer.points.unwrap_or(self.project.groom.value.control.points);
+        let target = self.project.target(i);
         let r = Recipe::new("interpolate", version::INTERPOLATE);
-        let r = r.param("points", points, self.in_groom(&format!("layer[{i}].points")));
+        let simulated = |r: Recipe| {
+            r.param("target", target.name(), self.in_shot("simulate.target")).param(
+                "frame",
+                frame,
+                "the frame's number",
+            )
+        };
+        match target {
+            Target::EveryHair => simulated(r),
+            Target::ControlHairs => simulated(self.skin(self.points(i, r), at, frame)),
+            Target::Off => self.skin(self.points(i, r), at, frame),
+        }
+    }
+
+    fn skin(&self, r: Recipe, at: &SkinAt, frame: i32) -> Recipe {
         match at {
             SkinAt::Rest => r.param("skin", "rest", "the skin's rest pose"),
             SkinAt::Rigid(t) => {
-                let motion = self.project.shot.value.skin.motion.as_ref().expect("a rigid skin has a motion");
-                let file = self.project.label(&self.project.shot.resolve(motion));
-                r.file("skin", &format!("{t:?}"), format!("{file} at frame {frame}"))
+                let motion = self.project.motion.as_ref().expect("a rigid skin has a motion");
+                r.file("skin", &format!("{t:?}"), format!("{} at frame {frame}", motion.file.label))
             }
             SkinAt::File(file) => r.file("skin", &file.hash, file.label.clone()),
         }

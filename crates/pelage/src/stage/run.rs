@@ -7,6 +7,7 @@ use crate::config::MapRef;
 use crate::progress::Progress;
 use crate::project::{Project, frame_list};
 use crate::report::{Report, StageReport, cpu_seconds, peak_bytes};
+use crate::timeline::Timeline;
 use pelage_geom::TiledMap;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -60,6 +61,9 @@ pub struct Runner<'a> {
     pub(super) layers: BTreeMap<usize, Rc<super::interpolate::LayerHairs>>,
     pub(super) placed: Option<pelage_groom::control::ControlHairs>,
     pub(super) control: Option<Rc<pelage_groom::control::ControlHairs>>,
+    pub(super) running: Option<super::simulate::Running>,
+    /// Frames that this run simulated (true), or took over from a run that was killed or ended earlier.
+    simulated: BTreeMap<i64, bool>,
     hashes: RefCell<FileHashes>,
     options: Options,
     last: BTreeMap<String, Recipe>,
@@ -91,6 +95,8 @@ impl<'a> Runner<'a> {
             layers: BTreeMap::new(),
             placed: None,
             control: None,
+            running: None,
+            simulated: BTreeMap::new(),
             hashes: RefCell::new(FileHashes::open(&cache)),
             options,
             last,
@@ -101,11 +107,17 @@ impl<'a> Runner<'a> {
 
     /// Payload of a finished step; `None` if it must run.
     pub fn fetch(&self, what: What) -> Option<Entry> {
-        let step = self.plan.step(what);
-        if self.options.force == Some(step.stage) && !self.ran.contains_key(&what) {
-            return None;
-        }
-        self.store.get(&step.recipe.key())
+        if self.is_forced(what) { None } else { self.store.get(&self.plan.step(what).recipe.key()) }
+    }
+
+    /// One payload file of a finished step; `None` if the step must run.
+    pub fn fetch_file(&self, what: What, name: &str) -> Option<Vec<u8>> {
+        if self.is_forced(what) { None } else { self.store.file(&self.plan.step(what).recipe.key(), name) }
+    }
+
+    /// True if a step runs whether its result is there or not.
+    pub fn is_forced(&self, what: What) -> bool {
+        self.options.force == Some(self.plan.step(what).stage) && !self.ran.contains_key(&what)
     }
 
     /// Keeps the result of a step.
@@ -114,6 +126,33 @@ impl<'a> Runner<'a> {
         self.store.put(recipe, counts.clone(), files).map_err(Error::disk(&self.project.cache_dir()))?;
         self.ran.insert(what, counts);
         Ok(())
+    }
+
+    /// Notes that a step is finished, whose files are in the cache.
+    pub(super) fn kept(&mut self, what: What, counts: Counts) {
+        self.ran.insert(what, counts);
+    }
+
+    /// Notes that a frame is simulated: now, or by an earlier run.
+    pub(super) fn simulated(&mut self, frame: i64, now: bool) {
+        let known = self.simulated.entry(frame).or_default();
+        *known = *known || now;
+        self.progress.step();
+    }
+
+    /// Says how the work on a step goes.
+    pub(super) fn working(&mut self, what: &str) {
+        self.progress.working(what);
+    }
+
+    /// Says a line about the stage that runs.
+    pub(super) fn say(&self, line: &str) {
+        self.progress.say_of_stage(line);
+    }
+
+    /// Shows the fraction done of something that takes long; never stops it.
+    pub(super) fn ticker(&self, what: &str) -> impl Fn(f64) -> bool + Sync + use<> {
+        self.progress.ticker(what)
     }
 
     /// Reads a map that the groom names.
@@ -140,6 +179,10 @@ impl<'a> Runner<'a> {
     fn selected(&self, stage: Stage) -> Vec<Step> {
         let wanted = |s: &&Step| match s.what {
             What::Frame(_, f) => self.options.frames.as_ref().is_none_or(|o| o.contains(&f)),
+            What::Simulate(_, k) => {
+                let last = self.options.frames.as_ref().map(|o| o.last().copied().unwrap_or(i32::MIN));
+                last.is_none_or(|f| *Timeline::new(self.project).stretch(k).start() <= i64::from(f))
+            }
             What::Sheet => self.options.sheet,
             _ => true,
         };
@@ -165,12 +208,20 @@ impl<'a> Runner<'a> {
             }
         }
         let new = |s: &&Step| !self.last.contains_key(&s.name) && !self.in_new_layer(s);
-        let frame = |s: &Step| if let What::Frame(_, f) = s.what { Some(f) } else { None };
-        let frames: BTreeSet<i32> = steps.iter().filter(new).filter_map(frame).collect();
+        let frames: BTreeSet<i32> = steps.iter().filter(new).flat_map(|s| self.frames_of(s)).collect();
         if !frames.is_empty() {
             out.push(format!("new: frame {}", frame_list(&frames.into_iter().collect::<Vec<_>>())));
         }
         out
+    }
+
+    /// Frames that a step makes.
+    fn frames_of(&self, step: &Step) -> Vec<i32> {
+        match step.what {
+            What::Frame(_, f) => vec![f],
+            What::Simulate(_, k) => Timeline::new(self.project).stretch(k).map(|f| f as i32).collect(),
+            _ => Vec::new(),
+        }
     }
 
     fn in_new_layer(&self, step: &Step) -> bool {
@@ -230,6 +281,11 @@ impl<'a> Runner<'a> {
             let stage_report = self.run_stage(stage, &mut last)?;
             report.stages.push(stage_report);
         }
+        // What a stage had to make of a later one belongs to the shot too.
+        for what in self.ran.keys() {
+            let step = self.plan.step(*what);
+            last.insert(step.name.clone(), step.recipe.clone());
+        }
         if last != self.last {
             self.store.set_last(&shot, &last).map_err(Error::disk(&self.project.cache_dir()))?;
         }
@@ -244,7 +300,8 @@ impl<'a> Runner<'a> {
         let mut report = StageReport { name: stage.name().to_owned(), ..Default::default() };
         report.reasons = self.reasons(&todo);
         if !todo.is_empty() {
-            self.progress.begin(stage.name(), todo.len());
+            let frames = |s: &Step| if stage == Stage::Simulate { self.frames_of(s).len() } else { 1 };
+            self.progress.begin(stage.name(), todo.iter().map(frames).sum());
             for reason in &report.reasons {
                 self.progress.say(&format!("{:<12} because {reason}", stage.name()));
             }
@@ -260,7 +317,9 @@ impl<'a> Runner<'a> {
             }
             self.progress.working(&step.name);
             self.make(step.what)?;
-            self.progress.step();
+            if stage != Stage::Simulate {
+                self.progress.step();
+            }
         }
         for step in steps.iter().filter(|s| !waiting.contains(&s.what)) {
             last.insert(step.name.clone(), step.recipe.clone());
@@ -268,8 +327,13 @@ impl<'a> Runner<'a> {
         // A step may turn out to be finished: another of this run had the same recipe.
         let (ran, found): (Vec<&Step>, Vec<&Step>) = todo.iter().partition(|s| self.ran.contains_key(&s.what));
         let found = found.into_iter().filter(|s| !waiting.contains(&s.what));
-        (report.ran, report.reused) = tally(stage, &ran, &done.iter().chain(found).collect::<Vec<_>>());
+        (report.ran, report.reused) = match stage {
+            Stage::Simulate => self.tally_simulated(&steps),
+            _ => tally(stage, &ran, &done.iter().chain(found).collect::<Vec<_>>()),
+        };
         report.counts = self.counts(&steps);
+        let skipped = report.counts.remove_entry(super::simulate::SLEEPING);
+        report.skipped.extend(skipped.filter(|s| s.1 > 0));
         report.warnings = std::mem::take(&mut self.warnings);
         report.warnings.extend(self.store.take_warnings());
         for warning in &report.warnings {
@@ -284,13 +348,26 @@ impl<'a> Runner<'a> {
         Ok(report)
     }
 
-    /// Counts of steps, of this or an earlier run, summed over layers. Frames are not summed: the largest frame counts.
+    /// Frames that were simulated, and frames that were there.
+    fn tally_simulated(&self, steps: &[Step]) -> (usize, usize) {
+        let frames: BTreeSet<i32> = steps.iter().flat_map(|s| self.frames_of(s)).collect();
+        let ran = frames.iter().filter(|f| self.simulated.get(&i64::from(**f)) == Some(&true)).count();
+        (ran, frames.len() - ran)
+    }
+
+    /// Counts of steps, of this or an earlier run, summed over layers. Frames are not summed: the largest
+    /// frame (or stretch) counts.
     fn counts(&self, steps: &[Step]) -> Counts {
         let mut moments: BTreeMap<Option<i32>, Counts> = BTreeMap::new();
         for step in steps {
-            let moment = if let What::Frame(_, f) = step.what { Some(f) } else { None };
+            let moment = match step.what {
+                What::Frame(_, f) => Some(f),
+                What::Simulate(_, k) => Some(k as i32),
+                _ => None,
+            };
             let found = self.ran.get(&step.what).cloned().or_else(|| self.store.counts(&step.recipe.key()));
             for (name, n) in found.unwrap_or_default() {
+                let moment = moment.filter(|_| !super::simulate::SUMMED.contains(&name.as_str()));
                 *moments.entry(moment).or_default().entry(name).or_default() += n;
             }
         }
@@ -303,7 +380,7 @@ impl<'a> Runner<'a> {
     }
 
     fn make(&mut self, what: What) -> Result<(), Error> {
-        use super::{export, groom, instance, interpolate, preview};
+        use super::{export, groom, instance, interpolate, preview, simulate};
         match what {
             What::Place => groom::placed(self).map(drop),
             What::Comb => groom::combed(self).map(drop),
@@ -312,6 +389,7 @@ impl<'a> Runner<'a> {
             What::Weights(i) => instance::weights(self, i).map(drop),
             What::Length(i) | What::Width(i) | What::Opacity(i) => instance::column(self, what, i).map(drop),
             What::Color(i) => instance::color(self, i).map(drop),
+            What::Simulate(..) => simulate::make(self, what),
             What::Rest(_) | What::Frame(..) => interpolate::positions(self, what).map(drop),
             What::Export(format) => export::write(self, what, format),
             What::Still => preview::still(self),
@@ -335,6 +413,6 @@ fn tally(stage: Stage, ran: &[&Step], done: &[&Step]) -> (usize, usize) {
             let rest = usize::from(new.is_empty() && !ran.is_empty() && !old.is_empty());
             (new.len() + rest, old.len() - rest)
         }
-        Stage::Export | Stage::Preview => (ran.len(), done.len()),
+        Stage::Simulate | Stage::Export | Stage::Preview => (ran.len(), done.len()),
     }
 }

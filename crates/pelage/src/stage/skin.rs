@@ -67,6 +67,16 @@ impl Skin {
         self.bvh.get_or_init(|| Bvh::build(&self.mesh.position, &self.mesh.triangle, &self.topology))
     }
 
+    /// Corners at rest of the triangle that a point is on.
+    pub fn corners(&self, p: &SurfacePoint) -> [Vec3; 3] {
+        pelage_geom::mesh::corners(&self.mesh.position, self.mesh.triangle[p.triangle as usize])
+    }
+
+    /// Polygons in its file.
+    pub fn faces(&self) -> usize {
+        self.faces
+    }
+
     /// Area of the rest skin, square scene units.
     pub fn area(&self) -> f64 {
         self.topology.area.iter().sum()

@@ -6,6 +6,7 @@
 //!   frame number. The facts of the shot are in the metadata record `pelage.shot`.
 //! * [`read_hair_mcap`] reads such a file frame by frame, [`verify_layers`] and [`verify_frames`] compare it with what should be in it.
 //! * [`write_frame_payload`] and [`read_frame_payload`] hold the positions of one frame and nothing else.
+//! * [`write_state_payload`] and [`read_state_payload`] hold the state of a simulation.
 //! * [`inspect`] says what is in any MCAP file.
 //!
 //! Points are not compressed: general compressors take a few percent off single-precision positions and cost four
@@ -19,7 +20,7 @@ mod record;
 mod write;
 
 pub use inspect::{McapChannel, McapSummary, inspect};
-pub use payload::{read_frame_payload, write_frame_payload};
+pub use payload::{read_frame_payload, read_state_payload, write_frame_payload, write_state_payload};
 pub use read::{HairMcap, McapFrame, read_hair_mcap, verify_frames, verify_layers};
 pub use write::McapHair;
 

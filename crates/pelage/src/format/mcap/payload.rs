@@ -31,6 +31,47 @@ pub fn write_frame_payload(out: impl Write + Seek, name: &str, frame: i32, layer
     done.and(flushed)
 }
 
+/// How a state is encoded: bytes that mean something to who wrote them.
+const STATE: &str = "pelage-state";
+
+/// The state of a step after a frame as an MCAP file with one message.
+pub fn write_state_payload(name: &str, frame: i64, state: &[u8]) -> Vec<u8> {
+    let options = options().calculate_chunk_crcs(false).calculate_data_section_crc(false);
+    let fill = || -> McapResult<Vec<u8>> {
+        let out = io::Cursor::new(Vec::with_capacity(state.len() + 4096));
+        let mut writer = options.calculate_summary_section_crc(false).create(out)?;
+        let facts = [("frame".to_owned(), frame.to_string())].into_iter().collect();
+        let channel_id = writer.add_channel(0, name, STATE, &facts)?;
+        let header = MessageHeader { channel_id, sequence: 0, log_time: 0, publish_time: 0 };
+        writer.write_to_known_channel(&header, state)?;
+        writer.finish()?;
+        Ok(writer.into_inner().into_inner())
+    };
+    fill().expect("writing to memory does not fail")
+}
+
+/// Reads what [`write_state_payload`] wrote.
+pub fn read_state_payload(bytes: &[u8]) -> Result<Vec<u8>, String> {
+    fn message(bytes: &[u8]) -> Result<Option<Vec<u8>>, String> {
+        let mut input = Bytes::new(bytes);
+        while let Some((code, body)) = record::next(&mut input)? {
+            match record::parse(code, body)? {
+                Record::Chunk(chunk) if chunk.compression.is_empty() => {
+                    if let Some(found) = message(&chunk.records()?)? {
+                        return Ok(Some(found));
+                    }
+                }
+                Record::Channel(c) if c.encoding != STATE => return Err("holds something else than a state".into()),
+                Record::Message(m) => return Ok(Some(m.data.to_vec())),
+                _ => {}
+            }
+        }
+        Ok(None)
+    }
+    let inner = bytes.strip_prefix(MAGIC).and_then(|b| b.strip_suffix(MAGIC));
+    message(inner.ok_or("is not an MCAP file, or not a whole one")?)?.ok_or("has no state".to_owned())
+}
+
 /// Reads what [`write_frame_payload`] wrote: the positions of every layer. The error says what is wrong.
 pub fn read_frame_payload(bytes: &[u8]) -> Result<Vec<Vec<[f32; 3]>>, String> {
     let inner = bytes.strip_prefix(MAGIC).and_then(|b| b.strip_suffix(MAGIC));
@@ -102,6 +143,17 @@ mod tests {
             let back = read_frame_payload(&bytes).unwrap();
             assert!(back.iter().map(Vec::as_slice).eq(layers.iter().copied()));
         }
+    }
+
+    #[test]
+    fn states_come_back_byte_by_byte() {
+        for n in [0, 1, 5000, 3_000_000] {
+            let state: Vec<u8> = (0..n).map(|i: u32| (i * 7) as u8).collect();
+            let bytes = write_state_payload("state", -12, &state);
+            assert_eq!(read_state_payload(&bytes).unwrap(), state);
+            assert!(read_state_payload(&bytes[..bytes.len() - 1]).is_err());
+        }
+        assert!(read_state_payload(&write(&[])).is_err());
     }
 
     #[test]

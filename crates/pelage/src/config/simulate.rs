@@ -1,0 +1,388 @@
+//! How hair is simulated: `[simulate]` of the shot file, and what a layer's hair is made of.
+
+use super::document::{ConfigError, Document, exactly};
+use super::{ShotFile, UpAxis};
+use schemars::JsonSchema;
+use serde::de::{DeserializeOwned, Deserializer, Error as _};
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+
+/// Segments of a simulated hair of a groom: twice the 12 points that long control hair is combed with. Half as many bend
+/// in visible corners, twice as many cost twice the time.
+pub const SEGMENTS: usize = 25;
+/// Frames between checkpoints: a second of film, so that an edit late in a shot does not simulate all of it again.
+const CHECKPOINT: u32 = 24;
+
+/// How hair is simulated.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Simulate {
+    /// What is simulated. A layer may say otherwise. Default: "every-hair".
+    pub target: Target,
+    /// Model of a strand. Default: "rod".
+    pub model: StrandModel,
+    /// Segments of a simulated hair, equal in length; hairs simulated one by one are exported with one point more.
+    /// Default: 25.
+    pub segments: Option<usize>,
+    /// Steps in a frame. Default: chosen from the motion of the skin.
+    pub substeps: Option<u32>,
+    /// Start in equilibrium under gravity, so that the groomed pose stands as it was combed. Default: true.
+    pub sag_free: Option<bool>,
+    /// Largest strain that is left in a segment: 0.01 is one percent. Default: 0.01.
+    pub strain_limit: f64,
+    /// Coulomb friction between hair and body. Default: 0.3.
+    pub friction: f64,
+    /// Distance that hair keeps from the body, millimetres. Default: 0.5.
+    pub offset: f64,
+    /// A root that moves farther than this in a frame takes its hair along without dynamics, metres. Default: 1.
+    pub teleport: f64,
+    /// Let strands at rest sleep. Default: true.
+    pub sleep: bool,
+    /// Frames between checkpoints, from which simulation goes on. Default: 24.
+    pub checkpoint: u32,
+    /// Gravity, m/s2: a number (downward), three numbers, or key frames
+    /// `[{ frame, value }]`. Default: 9.81.
+    pub gravity: Keyed<Amount>,
+    /// The wind. Default: none.
+    pub wind: Option<WindSettings>,
+}
+
+impl Default for Simulate {
+    fn default() -> Self {
+        Simulate {
+            target: Target::EveryHair,
+            model: StrandModel::Rod,
+            segments: None,
+            substeps: None,
+            sag_free: None,
+            strain_limit: 0.01,
+            friction: 0.3,
+            offset: 0.5,
+            teleport: 1.0,
+            sleep: true,
+            checkpoint: CHECKPOINT,
+            gravity: Keyed::constant(Amount::Number(9.81)),
+            wind: None,
+        }
+    }
+}
+
+/// What is simulated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Target {
+    /// Every hair by itself.
+    #[default]
+    EveryHair,
+    /// The control hairs; all others are blended from them.
+    ControlHairs,
+    /// Nothing: control hairs ride the skin.
+    Off,
+}
+
+impl Target {
+    /// Name as written in the file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Target::EveryHair => "every-hair",
+            Target::ControlHairs => "control-hairs",
+            Target::Off => "off",
+        }
+    }
+}
+
+/// Model of a strand.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum StrandModel {
+    /// Discrete elastic rod.
+    #[default]
+    Rod,
+    /// Springs with altitude springs, calibrated to the material, robust integration.
+    Springs,
+    /// Springs integrated as printed in the paper of Selle, Lentine and Fedkiw (2008).
+    Paper,
+}
+
+/// The wind.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WindSettings {
+    /// Mean velocity along the scene's axes, m/s: three numbers, or key frames `[{ frame, value }]`.
+    pub velocity: Keyed<Vector>,
+}
+
+/// Three numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct Vector(#[serde(deserialize_with = "exactly")] pub [f64; 3]);
+
+/// A number, or three.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "expected a number, three numbers, or a list of { frame, value }")]
+pub enum Amount {
+    /// A number.
+    Number(f64),
+    /// Three numbers.
+    Vector(Vector),
+}
+
+/// A value, or key frames `{ frame, value }`: linear in between, held beyond the ends.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Keyed<T>(pub Vec<Key<T>>);
+
+/// A key frame.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Key<T> {
+    /// Frame number, may lie between frames.
+    pub frame: f64,
+    /// Value there.
+    pub value: T,
+}
+
+impl<T> Keyed<T> {
+    /// The same value at all times.
+    pub fn constant(value: T) -> Self {
+        Keyed(vec![Key { frame: 0.0, value }])
+    }
+}
+
+impl Keyed<[f64; 3]> {
+    /// Value at a frame number.
+    pub fn at(&self, frame: f64) -> [f64; 3] {
+        let next = self.0.partition_point(|k| k.frame <= frame);
+        let (a, b) = (&self.0[next.saturating_sub(1)], &self.0[next.min(self.0.len() - 1)]);
+        let span = b.frame - a.frame;
+        let f = if span > 0.0 { ((frame - a.frame) / span).clamp(0.0, 1.0) } else { 0.0 };
+        std::array::from_fn(|x| a.value[x] + (b.value[x] - a.value[x]) * f)
+    }
+}
+
+impl Keyed<Amount> {
+    /// As vectors; numbers count along `-up`.
+    pub fn downward(&self, up: UpAxis) -> Keyed<[f64; 3]> {
+        let vector = |v: Amount| match (v, up) {
+            (Amount::Vector(v), _) => v.0,
+            (Amount::Number(g), UpAxis::Y) => [0.0, -g, 0.0],
+            (Amount::Number(g), UpAxis::Z) => [0.0, 0.0, -g],
+        };
+        Keyed(self.0.iter().map(|k| Key { frame: k.frame, value: vector(k.value) }).collect())
+    }
+}
+
+impl Keyed<Vector> {
+    /// As plain arrays.
+    pub fn vectors(&self) -> Keyed<[f64; 3]> {
+        Keyed(self.0.iter().map(|k| Key { frame: k.frame, value: k.value.0 }).collect())
+    }
+}
+
+impl<'de, T: DeserializeOwned> Deserialize<'de> for Keyed<T> {
+    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+        use toml::Value;
+        let failed = |e: toml::de::Error| D::Error::custom(e.message());
+        match Value::deserialize(d)? {
+            Value::Array(keys) if keys.iter().any(Value::is_table) => {
+                keys.into_iter().map(|k| Key::deserialize(k).map_err(failed)).collect::<Result<_, _>>().map(Keyed)
+            }
+            value => T::deserialize(value).map(Keyed::constant).map_err(failed),
+        }
+    }
+}
+
+impl<T: JsonSchema> JsonSchema for Keyed<T> {
+    fn schema_name() -> Cow<'static, str> {
+        format!("Keyed{}", T::schema_name()).into()
+    }
+
+    fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        let (value, key) = (generator.subschema_for::<T>(), generator.subschema_for::<Key<T>>());
+        schemars::json_schema!({ "anyOf": [value, { "type": "array", "items": key }] })
+    }
+}
+
+/// What simulated hair is made of.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Material {
+    /// Diameter of the simulated hair, micrometres; the render width is another matter. Default: 70.
+    pub diameter: f64,
+    /// Young's modulus, gigapascals. Default: 3.9.
+    pub young_gpa: f64,
+    /// Poisson's ratio. Default: 0.3.
+    pub poisson: f64,
+    /// Density, kg/m3. Default: 1300.
+    pub density: f64,
+    /// Internal damping: relaxation time of bending and twisting, seconds. Default: 0.002.
+    pub damping: f64,
+    /// Factor on bending stiffness. Default: 1.
+    pub bend_factor: f64,
+    /// Factor on twisting stiffness. Default: 1.
+    pub twist_factor: f64,
+    /// Factor on stretching stiffness. Default: 1.
+    pub stretch_factor: f64,
+    /// Factor on the drag of the air. Default: 1.
+    pub drag_factor: f64,
+}
+
+impl Default for Material {
+    fn default() -> Self {
+        let m = pelage_sim::Material::default();
+        Material {
+            diameter: 70.0,
+            young_gpa: 3.9,
+            poisson: m.poisson,
+            density: m.density,
+            damping: m.damping,
+            bend_factor: m.bend_factor,
+            twist_factor: m.twist_factor,
+            stretch_factor: m.stretch_factor,
+            drag_factor: m.drag_factor,
+        }
+    }
+}
+
+impl Material {
+    /// Every value by its key.
+    pub fn values(&self) -> [(&'static str, f64); 9] {
+        [
+            ("diameter", self.diameter),
+            ("young_gpa", self.young_gpa),
+            ("poisson", self.poisson),
+            ("density", self.density),
+            ("damping", self.damping),
+            ("bend_factor", self.bend_factor),
+            ("twist_factor", self.twist_factor),
+            ("stretch_factor", self.stretch_factor),
+            ("drag_factor", self.drag_factor),
+        ]
+    }
+
+    /// In SI units.
+    pub fn si(&self) -> pelage_sim::Material {
+        pelage_sim::Material {
+            diameter: self.diameter * 1e-6,
+            young: self.young_gpa * 1e9,
+            poisson: self.poisson,
+            density: self.density,
+            damping: self.damping,
+            bend_factor: self.bend_factor,
+            twist_factor: self.twist_factor,
+            stretch_factor: self.stretch_factor,
+            drag_factor: self.drag_factor,
+        }
+    }
+}
+
+/// Checks the material at a key of a file.
+pub fn check_material<T>(doc: &Document<T>, key: &str, m: &Material) -> Result<(), ConfigError> {
+    let ranges = [
+        (0.1, 1e5, "human hair has 50 to 100 micrometres"),
+        (1e-9, 1e4, "hair has 2 to 6 gigapascals"),
+        (-0.99, 0.5, "hair has 0.3"),
+        (1e-3, 1e6, "hair has 1300 kg/m3"),
+        (0.0, 10.0, "0.002 is usual"),
+        (0.0, 1e9, "1 is the material as it is"),
+        (0.0, 1e9, "1 is the material as it is"),
+        (1e-9, 1e9, "1 is the material as it is"),
+        (0.0, 1e9, "1 is the drag of a thread of that diameter"),
+    ];
+    for ((name, x), (low, high, help)) in m.values().into_iter().zip(ranges) {
+        range(doc, &format!("{key}.{name}"), x, low, high, help)?;
+    }
+    Ok(())
+}
+
+fn range<T>(doc: &Document<T>, key: &str, x: f64, low: f64, high: f64, help: &str) -> Result<(), ConfigError> {
+    if (low..=high).contains(&x) {
+        return Ok(());
+    }
+    Err(doc.error(key, format!("{x} is out of range: values go from {low} to {high}"), help))
+}
+
+impl Document<ShotFile> {
+    /// Checks `[simulate]`.
+    pub(super) fn check_simulate(&self) -> Result<(), ConfigError> {
+        let s = &self.value.simulate;
+        let number = |key: &str, x: f64, low: f64, high: f64, help: &str| {
+            range(self, &format!("simulate.{key}"), x, low, high, help)
+        };
+        let segments = s.segments.unwrap_or(SEGMENTS);
+        number("segments", segments as f64, 1.0, 4095.0, "25 is usual, 50 is fine")?;
+        number("substeps", f64::from(s.substeps.unwrap_or(1)), 1.0, 1e6, "leave it out and it is chosen")?;
+        number("strain_limit", s.strain_limit, 1e-6, 1e3, "0.01 is one percent")?;
+        number("friction", s.friction, 0.0, 100.0, "0.3 is usual")?;
+        number("offset", s.offset, 0.0, 1e3, "it is in millimetres; 0.5 is usual")?;
+        number("teleport", s.teleport, 1e-9, 1e9, "it is in metres; 1 is usual")?;
+        number("checkpoint", f64::from(s.checkpoint), 1.0, 1e6, "24 is usual")?;
+        let up = self.value.shot.up;
+        self.keys("simulate.gravity", &s.gravity.downward(up), 1e6, "9.81 is the earth's, in m/s2")?;
+        match &s.wind {
+            Some(wind) => self.keys("simulate.wind.velocity", &wind.velocity.vectors(), 1e4, "it is in m/s"),
+            None => Ok(()),
+        }
+    }
+
+    fn keys(&self, key: &str, keyed: &Keyed<[f64; 3]>, max: f64, help: &str) -> Result<(), ConfigError> {
+        for (i, k) in keyed.0.iter().enumerate() {
+            let at = if keyed.0.len() > 1 { format!("{key}[{i}]") } else { key.to_owned() };
+            if !k.value.iter().all(|x| x.abs() <= max) {
+                return Err(self.error(&at, format!("is out of range: values go from -{max} to {max}"), help));
+            }
+            if !k.frame.is_finite() || (i > 0 && keyed.0[i - 1].frame >= k.frame) {
+                return Err(self.error(&at, "does not come after the key before it", "key frames ascend"));
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, Deserialize)]
+    struct Holder {
+        gravity: Keyed<Amount>,
+    }
+
+    fn read(text: &str) -> Keyed<[f64; 3]> {
+        toml::from_str::<Holder>(&format!("gravity = {text}")).unwrap().gravity.downward(UpAxis::Z)
+    }
+
+    #[test]
+    fn values_are_numbers_vectors_or_keys() {
+        assert_eq!(read("9.81").at(7.0), [0.0, 0.0, -9.81]);
+        assert_eq!(read("10").at(7.0), [0.0, 0.0, -10.0]);
+        assert_eq!(read("[1, 2.5, 3]").at(-7.0), [1.0, 2.5, 3.0]);
+        let keys = read("[{ frame = 10, value = 4 }, { frame = 20, value = [2, 0, 0] }]");
+        for (frame, value) in [(0.0, [0.0, 0.0, -4.0]), (15.0, [1.0, 0.0, -2.0]), (20.0, [2.0, 0.0, 0.0])] {
+            assert_eq!(keys.at(frame), value);
+        }
+        assert_eq!(keys.at(99.0), [2.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn other_values_are_refused_in_words() {
+        let error = |text: &str| toml::from_str::<Holder>(&format!("gravity = {text}")).unwrap_err().to_string();
+        for text in ["\"down\"", "[1, 2]", "[]", "true"] {
+            assert!(error(text).contains("expected a number, three numbers"), "{text}: {}", error(text));
+        }
+        assert!(error("[{ frame = 1 }]").contains("missing field `value`"));
+        assert!(error("[{ frame = 1, valeu = 3 }]").contains("unknown field `valeu`"));
+    }
+
+    #[test]
+    fn defaults_are_those_of_the_simulation() {
+        let (m, s) = (Material::default().si(), Simulate::default());
+        let d = pelage_sim::Settings::default();
+        let close = |a: f64, b: f64| (a - b).abs() <= 1e-12 * b.abs();
+        assert!(close(m.diameter, d.material.diameter) && close(m.young, d.material.young));
+        assert_eq!(
+            (s.strain_limit, s.friction, s.teleport, s.sleep),
+            (d.strain_limit, d.friction, d.teleport, d.sleep)
+        );
+        assert!(close(s.offset * 1e-3, d.offset) && d.sag_free);
+    }
+}

@@ -1,0 +1,158 @@
+//! What a stretch of the simulation reads.
+
+use super::Stage;
+use super::plan::{Plan, Reader, Step, What, version};
+use crate::cache::{Key, Recipe};
+use crate::config::{Keyed, Target};
+use crate::project::{Project, SkinAt, SkinMotion};
+use crate::timeline::{STEP, Timeline};
+
+impl Plan {
+    /// Adds a stretch, chained to the one before it.
+    pub(super) fn add_stretch(&mut self, r: &Reader<'_>, timeline: &Timeline<'_>, i: usize, k: u32) {
+        let frames = timeline.stretch(k);
+        let recipe = self.stretch(r, timeline, i, k, *frames.end());
+        let name = format!("simulate/{}/{}", r.project.groom.value.layer[i].name, frames.start());
+        let mut reads = vec![hairs(r.project, i)];
+        reads.extend((k > 0).then(|| What::Simulate(i, k - 1)));
+        self.push(Step { what: What::Simulate(i, k), name, stage: Stage::Simulate, recipe, reads });
+    }
+
+    /// Recipe of a stretch that ends with frame `end`. Layers do not enter by name: two that simulate the same control
+    /// hairs alike share the result.
+    fn stretch(&self, r: &Reader<'_>, timeline: &Timeline<'_>, i: usize, k: u32, end: i64) -> Recipe {
+        let mut recipe = r.stretch(timeline, i, k, end).step("hairs", &self.step(hairs(r.project, i)).recipe.key());
+        if k > 0 {
+            recipe = recipe.step("before", &self.step(What::Simulate(i, k - 1)).recipe.key());
+        }
+        recipe
+    }
+
+    /// Keys that a stretch would have if it ended earlier, with its last frame, the longest first: where the shot has
+    /// grown, simulation goes on from there.
+    pub fn shorter(&self, project: &Project, i: usize, k: u32) -> impl Iterator<Item = (i64, Key)> {
+        let timeline = Timeline::new(project);
+        let frames = timeline.stretch(k);
+        let ends = (*frames.start()..*frames.end()).rev();
+        ends.map(move |end| (end, self.stretch(&Reader::new(project), &timeline, i, k, end).key()))
+    }
+}
+
+/// The step that makes the hairs that are simulated.
+fn hairs(project: &Project, i: usize) -> What {
+    if project.target(i) == Target::EveryHair { What::Rest(i) } else { What::Comb }
+}
+
+impl Reader<'_> {
+    fn stretch(&self, timeline: &Timeline<'_>, i: usize, k: u32, end: i64) -> Recipe {
+        let shot = &self.project.shot.value;
+        let r = self.unit(self.rest(Recipe::new("simulate", version::SIMULATE)));
+        let r = r.param("target", self.project.target(i).name(), self.in_shot("simulate.target"));
+        let r = r.param("fps", shot.shot.fps, self.in_shot("shot.fps"));
+        let r = self.settings(r);
+        let mut r = self.material(r, i);
+        let first = *timeline.stretch(k).start();
+        r = r.param("frames", format!("{first}-{end}"), self.in_shot("shot.frames (simulated)"));
+        let simulated = *timeline.simulated(k).start()..=end;
+        r = self.forces(r, *simulated.start() - 1, end);
+        let arrival = timeline.arrival();
+        if k == 0 {
+            r = r.param("preroll", timeline.preroll, self.in_shot("shot.preroll"));
+        }
+        if k == 0 && arrival > timeline.start() {
+            r = r.param("arrival", arrival - first, self.in_shot("skin (frames before the first)"));
+            r = self.easing(r, timeline, arrival, end);
+        }
+        for frame in (*simulated.start()).max(arrival)..=end {
+            r = self.skin_at(r, timeline, frame, frame > arrival);
+        }
+        r
+    }
+
+    fn settings(&self, r: Recipe) -> Recipe {
+        let s = &self.project.shot.value.simulate;
+        let substeps = s.substeps.map_or("automatic".to_owned(), |n| n.to_string());
+        let values = [
+            ("model", format!("{:?}", s.model).to_lowercase()),
+            ("segments", self.project.segments().to_string()),
+            ("substeps", substeps),
+            ("sag_free", s.sag_free.unwrap_or(true).to_string()),
+            ("strain_limit", s.strain_limit.to_string()),
+            ("friction", s.friction.to_string()),
+            ("offset", s.offset.to_string()),
+            ("teleport", s.teleport.to_string()),
+            ("sleep", s.sleep.to_string()),
+        ];
+        let add =
+            |r: Recipe, (key, value): (&str, String)| r.param(key, value, self.in_shot(&format!("simulate.{key}")));
+        values.into_iter().fold(r, add)
+    }
+
+    fn material(&self, r: Recipe, i: usize) -> Recipe {
+        let values = self.project.groom.value.layer[i].material.values();
+        let label = |key: &str| self.in_groom(&format!("layer[{i}].material.{key}"));
+        values.into_iter().fold(r, |r, (key, x)| r.param(&format!("material.{key}"), x, label(key)))
+    }
+
+    /// Gravity and wind as they are from one frame to another.
+    fn forces(&self, r: Recipe, from: i64, to: i64) -> Recipe {
+        let shot = &self.project.shot.value;
+        let gravity = shot.simulate.gravity.downward(shot.shot.up);
+        let frames = (from..=to).map(|f| f as f64);
+        let r = r.param("gravity", values(&gravity, frames), self.in_shot("simulate.gravity"));
+        let Some(wind) = &shot.simulate.wind else { return r };
+        let middles = (from..to).map(|f| f as f64 + 0.5);
+        r.param("wind.velocity", values(&wind.velocity.vectors(), middles), self.in_shot("simulate.wind.velocity"))
+    }
+
+    /// What the way from the rest pose into the motion reads of the motion, where its frames do not say it.
+    fn easing(&self, r: Recipe, timeline: &Timeline<'_>, arrival: i64, end: i64) -> Recipe {
+        if let Some(m) = &self.project.motion {
+            let soon = m.at(arrival as f64 + STEP);
+            return r.file("easing", &format!("{soon:?}"), format!("{} after frame {arrival}", m.file.label));
+        }
+        match timeline.skin_at(arrival + 1) {
+            Some(SkinAt::File(file)) if arrival + 1 > end => r.file("easing", &file.hash, file.label.clone()),
+            _ => r,
+        }
+    }
+
+    /// The skin at a frame, and on the way to it from the frame before.
+    fn skin_at(&self, r: Recipe, timeline: &Timeline<'_>, frame: i64, way: bool) -> Recipe {
+        let name = format!("skin.{frame}");
+        if let Some(m) = &self.project.motion {
+            let label = format!("{} at frame {frame}", m.file.label);
+            let r = r.file(&name, &format!("{:?}", m.at(frame as f64)), label.clone());
+            let samples = if way { between(m, frame) } else { None };
+            return r.file(&format!("{name}.way"), &samples.unwrap_or_default(), label);
+        }
+        match timeline.skin_at(frame) {
+            Some(SkinAt::File(file)) => r.file(&name, &file.hash, file.label.clone()),
+            _ => r,
+        }
+    }
+}
+
+/// The samples of a motion that say where it is between a frame and the one before; `None` if they are at the two frames.
+fn between(m: &SkinMotion, frame: i64) -> Option<String> {
+    let time = &m.motion.time;
+    let [from, to] = [m.seconds(frame as f64 - 1.0), m.seconds(frame as f64)];
+    let first = time.partition_point(|t| *t <= from).saturating_sub(1);
+    let last = time.partition_point(|t| *t < to).min(time.len() - 1);
+    if last == first || (last == first + 1 && time[first] == from && time[last] == to) {
+        return None;
+    }
+    let sample = |i: usize| format!("{:?} {:?} {:?}", time[i], m.motion.translation[i], m.motion.rotation[i]);
+    let all: Vec<String> = (first..=last).map(sample).collect();
+    let text = format!("{from:?} {to:?} {}", all.join(" "));
+    Some(blake3::hash(text.as_bytes()).to_hex().to_string())
+}
+
+/// Values at some frames; once, if they are all the same.
+fn values(keyed: &Keyed<[f64; 3]>, frames: impl Iterator<Item = f64>) -> String {
+    let all: Vec<[f64; 3]> = frames.map(|f| keyed.at(f)).collect();
+    match all.first() {
+        Some(first) if all.iter().all(|v| v == first) => format!("{first:?}"),
+        _ => format!("{all:?}"),
+    }
+}

@@ -1,0 +1,415 @@
+//! Simulate: hair in motion, one stretch of frames after another, each from the checkpoint at the end of the one before.
+
+use super::run::{Counts, Runner};
+use super::{What, groom, instance, interpolate};
+use crate::Error;
+use crate::cache::LongStep;
+use crate::config::{StrandModel, Target};
+use crate::format::{mcap, ply};
+use crate::project::SkinAt;
+use crate::timeline::Timeline;
+use pelage_geom::ride::{Ride, ease_positions, rides};
+use pelage_geom::{Offsets, Pose, SurfacePoint, Vec3};
+use pelage_groom::control;
+use pelage_sim::{Body, Hairs, Model, Rigid, Root, Settings, SimError, Simulation, Span, SpanReport, Started, Wind};
+use rayon::prelude::*;
+use std::time::Instant;
+
+/// Checkpoints within a stretch take at most this share of the time: a run that is killed loses about as little as that
+/// allows. Much more is felt, much less loses minutes of a large groom.
+const SAVING: f64 = 0.03;
+
+/// Strands that a warning names.
+const NAMED: usize = 8;
+
+/// How far a skin may be from its rest pose where the simulation starts, relative to its size.
+const AT_REST: f64 = 1e-6;
+
+/// Count of strands at rest: what the stage skips.
+pub(super) const SLEEPING: &str = "sleeping_strands";
+
+/// Counts that add up over stretches; of others the largest counts.
+pub(super) const SUMMED: [&str; 4] =
+    ["particle steps", "strands carried over a jump", "strands held for a frame", "roots held for a frame"];
+
+/// A layer in motion, kept from one stretch to the next.
+pub(super) struct Running {
+    layer: usize,
+    /// The frame that it has come to.
+    frame: i64,
+    sim: Simulation,
+    source: Source,
+}
+
+/// Hairs at rest, as they are simulated.
+struct Source {
+    offsets: Offsets,
+    /// Metres.
+    position: Vec<[f64; 3]>,
+    id: Vec<u64>,
+    root: Vec<SurfacePoint>,
+}
+
+/// Positions of a simulated layer at a frame, scene units relative to the skin's origin.
+pub fn positions(run: &mut Runner<'_>, i: usize, frame: i32) -> Result<Vec<[f32; 3]>, Error> {
+    let what = What::Simulate(i, Timeline::new(run.project).stretch_of(frame));
+    let read = |run: &Runner<'_>| {
+        let bytes = run.fetch_file(what, &frame_file(i64::from(frame)))?;
+        mcap::read_frame_payload(&bytes).ok()?.into_iter().next()
+    };
+    if let Some(found) = read(run) {
+        return Ok(found);
+    }
+    make(run, what)?;
+    let lost = std::io::Error::other("a simulated frame can't be read back");
+    read(run).ok_or_else(|| Error::disk(&run.project.cache_dir())(lost))
+}
+
+fn frame_file(frame: i64) -> String {
+    format!("frame.{frame}.mcap")
+}
+
+fn state_file(frame: i64) -> String {
+    format!("state.{frame}.mcap")
+}
+
+/// Simulates a stretch.
+pub fn make(run: &mut Runner<'_>, what: What) -> Result<(), Error> {
+    let What::Simulate(i, k) = what else { unreachable!("{what:?} is not simulated") };
+    let project = run.project;
+    let timeline = Timeline::new(project);
+    let (first, end) = timeline.stretch(k).into_inner();
+    let cache = project.cache_dir();
+    let disk = || Error::disk(&cache);
+    let forced = run.is_forced(what);
+    let mut step = run.store.long_step(&run.plan.step(what).recipe, forced).map_err(disk())?;
+    let mut at = saved(&step);
+    if at.is_none() && !forced {
+        at = shorter(run, &mut step, i, k)?;
+    }
+    let begin = at.unwrap_or(*timeline.simulated(k).start() - 1);
+    let mut running = match run.running.take().filter(|r| r.layer == i && r.frame == begin) {
+        Some(running) => running,
+        None => {
+            let (mut running, started) = start(run, i, &timeline)?;
+            running.frame = begin;
+            let state = match at {
+                Some(_) => step.read(&state_file(begin)),
+                None if k > 0 => Some(state_before(run, What::Simulate(i, k - 1), begin)?),
+                None => None,
+            };
+            if let Some(state) = state {
+                let state = mcap::read_state_payload(&state).map_err(|e| Error::input(e, "delete the cache folder"))?;
+                running.sim.restore(&state).map_err(|e| failed(run, i, &e))?;
+            }
+            note_start(run, i, &running, &started, &mut step)?;
+            running
+        }
+    };
+    for frame in first..=begin {
+        run.simulated(frame, false);
+    }
+    advance(run, &timeline, &mut running, &mut step, k, end)?;
+    let counts = step.finish(&run.store).map_err(disk())?;
+    run.kept(what, counts);
+    // The last stretch needs no more; the first frames of a stretch may be asked for again after damage.
+    run.running = (end < timeline.last).then_some(running);
+    Ok(())
+}
+
+/// The frame that a killed run had come to.
+fn saved(step: &LongStep) -> Option<i64> {
+    let states = step.files().filter_map(|f| f.strip_prefix("state.")?.strip_suffix(".mcap")?.parse().ok());
+    states.max()
+}
+
+/// Takes over the frames and the last state of this stretch from a time when the shot ended earlier.
+fn shorter(run: &Runner<'_>, step: &mut LongStep, i: usize, k: u32) -> Result<Option<i64>, Error> {
+    let found = run.plan.shorter(run.project, i, k).find(|(_, key)| run.store.contains(key));
+    let Some((end, key)) = found else { return Ok(None) };
+    let first = *Timeline::new(run.project).stretch(k).start();
+    let names = (first..=end).map(frame_file).chain([state_file(end)]);
+    let files: Option<Vec<(String, Vec<u8>)>> = names.map(|n| Some((n.clone(), run.store.file(&key, &n)?))).collect();
+    let Some(files) = files else { return Ok(None) };
+    let cache = run.project.cache_dir();
+    let mut keep = || -> std::io::Result<()> {
+        for (name, bytes) in &files {
+            step.write(name, bytes)?;
+        }
+        step.counts().extend(run.store.counts(&key).unwrap_or_default());
+        step.save("state.", &state_file(end))
+    };
+    keep().map_err(Error::disk(&cache))?;
+    Ok(Some(end))
+}
+
+/// State at the end of the stretch before; a damaged one is simulated again.
+fn state_before(run: &mut Runner<'_>, what: What, end: i64) -> Result<Vec<u8>, Error> {
+    let name = state_file(end);
+    if let Some(found) = run.fetch_file(what, &name) {
+        return Ok(found);
+    }
+    make(run, what)?;
+    let lost = std::io::Error::other("a checkpoint can't be read back");
+    run.fetch_file(what, &name).ok_or_else(|| Error::disk(&run.project.cache_dir())(lost))
+}
+
+/// The hairs of a layer at rest, ready to move.
+fn start(run: &mut Runner<'_>, i: usize, timeline: &Timeline<'_>) -> Result<(Running, Started), Error> {
+    let source = source(run, i)?;
+    let settings = settings(run, i);
+    let shot = &run.project.shot.value;
+    let points = settings.segments.map_or(source.position.len() / source.id.len().max(1), |s| s + 1);
+    let bytes = Simulation::memory(source.id.len(), points);
+    let name = &run.project.groom.value.layer[i].name;
+    run.say(&format!("{} hairs of {points} points in {name}: about {}", source.id.len(), size(bytes)));
+    let hairs = Hairs { offsets: &source.offsets, position: &source.position, id: &source.id };
+    let gravity = shot.simulate.gravity.downward(shot.shot.up).at(timeline.start() as f64);
+    let (sim, started) = Simulation::new(&hairs, &settings, gravity).map_err(|e| failed(run, i, &e))?;
+    let running = Running { layer: i, frame: timeline.start(), sim, source };
+    if timeline.preroll == 0 {
+        check_at_rest(run, timeline, &running.source)?;
+    }
+    Ok((running, started))
+}
+
+fn size(bytes: u64) -> String {
+    let mega = bytes as f64 / 1e6;
+    if mega < 1000.0 { format!("{:.0} MB", mega.ceil()) } else { format!("{:.1} GB", mega / 1e3) }
+}
+
+fn source(run: &mut Runner<'_>, i: usize) -> Result<Source, Error> {
+    let unit = run.project.shot.value.shot.meters_per_unit;
+    let skin = groom::skin(run)?;
+    if run.project.target(i) == Target::EveryHair {
+        let (roots, points) = (instance::roots(run, i)?, run.project.points(i));
+        let rest = interpolate::positions(run, What::Rest(i))?;
+        let origin = skin.origin();
+        let metres = |p: &[f32; 3]| std::array::from_fn(|x| (f64::from(p[x]) + origin[x]) * unit);
+        return Ok(Source {
+            offsets: Offsets::uniform(roots.id.len(), points),
+            position: rest.par_iter().map(metres).collect(),
+            id: roots.id.clone(),
+            root: roots.root.clone(),
+        });
+    }
+    let controls = groom::combed(run)?;
+    let on = control::Skin { mesh: &skin.mesh, topology: &skin.topology, rest: &skin.rest };
+    let hair = |h: usize| {
+        let frame = on.frame(&controls.root[h]);
+        controls.placed(h, &frame).map(|p| (p * unit).into()).collect::<Vec<[f64; 3]>>()
+    };
+    Ok(Source {
+        offsets: Offsets::uniform(controls.len(), controls.points),
+        position: (0..controls.len()).flat_map(hair).collect(),
+        id: (0..controls.len() as u64).collect(),
+        root: controls.root.clone(),
+    })
+}
+
+fn settings(run: &Runner<'_>, i: usize) -> Settings {
+    let s = &run.project.shot.value.simulate;
+    Settings {
+        model: match s.model {
+            StrandModel::Rod => Model::Rod,
+            StrandModel::Springs => Model::Springs,
+            StrandModel::Paper => Model::Paper,
+        },
+        material: run.project.groom.value.layer[i].material.si(),
+        segments: Some(run.project.segments()),
+        substeps: s.substeps,
+        sag_free: s.sag_free.unwrap_or(true),
+        strain_limit: s.strain_limit,
+        friction: s.friction,
+        offset: s.offset * 1e-3,
+        teleport: s.teleport,
+        sleep: s.sleep,
+        ..Settings::default()
+    }
+}
+
+fn failed(run: &Runner<'_>, i: usize, e: &SimError) -> Error {
+    Error::input(format!("layer {} can't be simulated: {e}", run.project.groom.value.layer[i].name), "")
+}
+
+/// Counts and warnings of what a simulation starts with.
+fn note_start(
+    run: &mut Runner<'_>,
+    i: usize,
+    running: &Running,
+    started: &Started,
+    step: &mut LongStep,
+) -> Result<(), Error> {
+    let hairs = instance::roots(run, i)?.id.len();
+    let layer = &run.project.groom.value.layer[i].name;
+    let counts = step.counts();
+    for (name, n) in [
+        ("hairs", hairs as u64),
+        ("simulated", running.source.id.len() as u64),
+        ("particles", started.particles),
+        ("strands stiffened so that their pose can stand", started.stiffened.len() as u64),
+        ("strands too short to simulate", started.rigid.len() as u64),
+    ] {
+        counts.insert(name.to_owned(), n);
+    }
+    if !started.stiffened.is_empty() {
+        let ids: Vec<u64> = started.stiffened.iter().map(|s| s.id).collect();
+        let most = started.stiffened.iter().map(|s| s.factor).fold(0.0, f64::max);
+        let text =
+            format!("layer {layer}: strands stiffened (up to {most:.2} times) to stand as groomed: {}", list(&ids));
+        run.warnings.push(text);
+    }
+    Ok(())
+}
+
+fn list(ids: &[u64]) -> String {
+    let named: Vec<String> = ids.iter().take(NAMED).map(u64::to_string).collect();
+    let more = if ids.len() > NAMED { format!(" and {} more", ids.len() - NAMED) } else { String::new() };
+    named.join(", ") + &more
+}
+
+/// Where the roots are at a frame: in the world, or for a skin that moves as a whole, at rest.
+fn root_rides(run: &mut Runner<'_>, timeline: &Timeline<'_>, source: &Source, frame: i64) -> Result<Vec<Ride>, Error> {
+    let skin = groom::skin(run)?;
+    let arrival = timeline.arrival();
+    if timeline.rigid(arrival, 0.0).is_some() {
+        let on_skin = |p: &SurfacePoint| Ride::still(p.blend(skin.corners(p)).into());
+        return Ok(source.root.iter().map(on_skin).collect());
+    }
+    let read = |frame: i64| match timeline.skin_at(frame) {
+        Some(SkinAt::File(file)) => Ok(ply::read_frame(&file.path, skin.mesh.position.len(), skin.faces())?),
+        _ => Ok::<_, Error>(skin.mesh.position.clone()),
+    };
+    let position = if frame >= arrival {
+        read(frame)?
+    } else {
+        let target = read(arrival)?;
+        let next = if timeline.skin_at(arrival + 1).is_some() { read(arrival + 1)? } else { target.clone() };
+        let (s, frames) = timeline.way(arrival, frame);
+        ease_positions(&skin.mesh.position, &target, &next, frames, s)
+    };
+    let pose = Pose::new(&skin.mesh, &skin.topology, position);
+    Ok(rides(&skin.mesh, &skin.topology, &skin.rest, &pose, &source.root))
+}
+
+/// Without pre-roll the simulation starts at the first frame: there the skin must be at rest.
+fn check_at_rest(run: &mut Runner<'_>, timeline: &Timeline<'_>, source: &Source) -> Result<(), Error> {
+    let skin = groom::skin(run)?;
+    let at_rest = rides(&skin.mesh, &skin.topology, &skin.rest, &skin.rest, &source.root);
+    let mut now = root_rides(run, timeline, source, timeline.first)?;
+    if let Some(t) = timeline.rigid(timeline.first, timeline.first as f64) {
+        now.iter_mut().for_each(|r| r.position = t.apply(Vec3::from(r.position)).into());
+    }
+    let (low, high) = skin.mesh.bounds();
+    let tolerance = AT_REST * (Vec3::from(high) - Vec3::from(low)).norm();
+    let moved = |(a, b): (&Ride, &Ride)| (Vec3::from(a.position) - Vec3::from(b.position)).norm() > tolerance;
+    if at_rest.iter().zip(&now).any(moved) {
+        let what = format!("is 0, but the skin is not at its rest pose at frame {}", timeline.first);
+        let help = "give it frames to come there from the rest pose: 12 is usual";
+        return Err(run.project.shot.error("shot.preroll", what, help).into());
+    }
+    Ok(())
+}
+
+/// Roots in metres, each turned the shorter way from where it was.
+fn roots(rides: &[Ride], before: Option<&[Root]>, unit: f64) -> Vec<Root> {
+    let root = |(h, r): (usize, &Ride)| {
+        let same = before.is_none_or(|b| (0..4).map(|x| b[h].rotation[x] * r.rotation[x]).sum::<f64>() >= 0.0);
+        let rotation = if same { r.rotation } else { r.rotation.map(|x| -x) };
+        Root { position: r.position.map(|x| x * unit), rotation }
+    };
+    rides.par_iter().enumerate().map(root).collect()
+}
+
+/// Simulates up to frame `end` and keeps every frame of the shot and a checkpoint now and then.
+fn advance(
+    run: &mut Runner<'_>,
+    timeline: &Timeline<'_>,
+    running: &mut Running,
+    step: &mut LongStep,
+    k: u32,
+    end: i64,
+) -> Result<(), Error> {
+    let project = run.project;
+    let shot = &project.shot.value;
+    let unit = shot.shot.meters_per_unit;
+    let cache = project.cache_dir();
+    let disk = || Error::disk(&cache);
+    let (gravity, wind) = (shot.simulate.gravity.downward(shot.shot.up), shot.simulate.wind.as_ref());
+    let (layer, arrival) = (&project.groom.value.layer[running.layer].name, timeline.arrival());
+    let origin = groom::skin(run)?.origin();
+    let mut before = root_rides(run, timeline, &running.source, running.frame)?;
+    let (mut saved, mut saving) = (Instant::now(), 0.0);
+    while running.frame < end {
+        let (from, frame) = (running.frame as f64, running.frame + 1);
+        let now = root_rides(run, timeline, &running.source, frame)?;
+        let begin = roots(&before, None, unit);
+        let ends = roots(&now, Some(&begin), unit);
+        let motion = |f: f64| timeline.rigid(arrival, from + f).map_or(Rigid::default(), |t| placement(&t, unit));
+        let wind = wind.map(|w| Wind { velocity: w.velocity.vectors().at(from + 0.5) });
+        let span = Span {
+            seconds: 1.0 / shot.shot.fps,
+            time: timeline.seconds(from),
+            motion: &motion,
+            roots: [&begin, &ends],
+            body: &Body::default(),
+            gravity: [gravity.at(from), gravity.at(frame as f64)],
+            wind: wind.as_ref(),
+        };
+        let clock = Instant::now();
+        let ticker = run.ticker(&format!("{layer} {frame}"));
+        let report = running.sim.advance(&span, &ticker).map_err(|e| failed(run, running.layer, &e))?;
+        running.frame = frame;
+        note(run, layer, frame, &report, step.counts(), clock.elapsed().as_secs_f64());
+        if frame >= *timeline.stretch(k).start() {
+            let scene = |p: &[f64; 3]| std::array::from_fn::<f32, 3, _>(|x| (p[x] / unit - origin[x]) as f32);
+            let positions: Vec<[f32; 3]> = running.sim.positions().par_iter().map(scene).collect();
+            step.write(&frame_file(frame), &frame_bytes(frame, &positions)).map_err(disk())?;
+            run.simulated(frame, true);
+        }
+        if frame == end || saved.elapsed().as_secs_f64() * SAVING >= saving {
+            let clock = Instant::now();
+            let (name, state) = (state_file(frame), running.sim.save());
+            let bytes = mcap::write_state_payload("state", frame, &state);
+            step.write(&name, &bytes).and_then(|()| step.save("state.", &name)).map_err(disk())?;
+            (saved, saving) = (Instant::now(), clock.elapsed().as_secs_f64());
+        }
+        before = now;
+    }
+    Ok(())
+}
+
+fn frame_bytes(frame: i64, positions: &[[f32; 3]]) -> Vec<u8> {
+    let mut file = std::io::Cursor::new(Vec::with_capacity(positions.len() * 12 + 4096));
+    let frame = i32::try_from(frame).expect("a frame of the shot");
+    mcap::write_frame_payload(&mut file, "simulate", frame, &[positions]).expect("writing to memory does not fail");
+    file.into_inner()
+}
+
+/// `world = rotation (rest - pivot) + pivot + translation` in metres, without the pivot.
+fn placement(t: &pelage_geom::motion::RigidTransform, unit: f64) -> Rigid {
+    let at = t.apply(Vec3::zeros()) * unit;
+    Rigid { rotation: t.rotation, translation: at.into() }
+}
+
+/// Counts of a frame, what is odd in it, and how it goes.
+fn note(run: &mut Runner<'_>, layer: &str, frame: i64, r: &SpanReport, counts: &mut Counts, seconds: f64) {
+    let mut most = |name: &str, n: u64| {
+        let at = counts.entry(name.to_owned()).or_default();
+        *at = n.max(*at);
+    };
+    most(SLEEPING, r.sleeping);
+    most("points in contact", r.contacts);
+    most("strands that took steps of their own", r.subdivided);
+    most("largest strain, millionths", (r.largest_strain * 1e6).round() as u64);
+    let values = [r.particle_steps, r.teleported, r.held.len() as u64, r.bad_roots.len() as u64];
+    SUMMED.into_iter().zip(values).for_each(|(name, n)| *counts.entry(name.to_owned()).or_default() += n);
+    for (ids, what) in [(&r.held, "strands diverged and were held"), (&r.bad_roots, "roots are not numbers: held")] {
+        if !ids.is_empty() {
+            run.warnings.push(format!("layer {layer}, frame {frame}: {} {what}: {}", ids.len(), list(ids)));
+        }
+    }
+    let rate = r.particle_steps as f64 / seconds.max(1e-9) / 1e6;
+    let (strain, dt) = (100.0 * r.largest_strain, 1e3 * r.shortest_step);
+    run.working(&format!("{layer} {frame}: {rate:.1} M points x steps/s, strain {strain:.2} %, dt {dt:.3} ms"));
+}
