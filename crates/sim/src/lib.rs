@@ -6,7 +6,10 @@ pub mod body;
 pub mod simulation;
 pub mod wind;
 
-pub use body::{Body, Hit, Motion, Part, Rigid, Shape};
+pub use body::{
+    Body, Bounds, Closed, Deforming, Ellipsoid, Exact, Field, FieldSettings, Flow, Hit, Instant, Motion, Part, Rigid,
+    RigidFit, Shape, Table, rigid_fit,
+};
 pub use simulation::{
     Hairs, Material, Model, Root, Settings, SimError, Simulation, Span, SpanReport, Started, StiffenedStrand,
 };
