@@ -16,7 +16,10 @@ pub mod stage;
 pub mod springs;
 pub mod wind;
 
-pub use body::{Body, Hit, Motion, Part, Rigid, Shape};
+pub use body::{
+    Body, Bounds, Closed, Deforming, Ellipsoid, Exact, Field, FieldSettings, Flow, Hit, Instant, Motion, Part, Rigid,
+    RigidFit, Shape, Table, rigid_fit,
+};
 pub use simulation::{
     End, Hairs, Material, Model, Root, Settings, SimError, Simulation, Span, SpanReport, Started, StiffenedStrand,
 };

@@ -31,7 +31,7 @@ impl Closed {
             let middle = mean(&mesh.position, &rim);
             let at = |k: usize| Vec3::from(mesh.position[rim[k % rim.len()] as usize]);
             let lid: f64 = (0..rim.len()).map(|k| 0.5 * (at(k) - middle).cross(&(at(k + 1) - middle)).norm()).sum();
-            if !(lid <= LARGEST_LID * area) {
+            if lid > LARGEST_LID * area || lid.is_nan() {
                 continue;
             }
             let centre = closed.mesh.position.len() as u32;

@@ -58,7 +58,7 @@ impl Frames {
         let d = self.deforming();
         let [f, _] = d.field;
         let naive = |p: Vec3, a: f64| f.sample(p).distance * (1.0 - a) + d.field[1].sample(p).distance * a;
-        let forward = |p: Vec3, a: f64| f.sample(p - d.flow[0].at(&f.locate(p).0) * (a * SECONDS)).distance;
+        let forward = |p: Vec3, a: f64| f.sample(p - f.carried(d.flow[0], p) * (a * SECONDS)).distance;
         let paper = |p: Vec3, a: f64| d.sample_rounds(p, a, 0).distance;
         let ours = |p: Vec3, a: f64| d.sample(p, a).distance;
         let schemes: [&dyn Fn(Vec3, f64) -> f64; 4] = [&naive, &forward, &paper, &ours];
@@ -70,9 +70,8 @@ impl Frames {
 fn sphere(shift: f64, angle: f64, stretch: f64) -> Frames {
     let mesh = cube_sphere(32, 0.1);
     let turn = UnitQuaternion::from_scaled_axis(Vec3::new(0.2, 0.9, 0.4).normalize() * angle);
-    let moved = |p: &[f64; 3]| {
-        (turn * Vec3::new(p[0], p[1] * stretch, p[2]) + Vec3::new(0.8, 0.36, 0.48) * shift).into()
-    };
+    let moved =
+        |p: &[f64; 3]| (turn * Vec3::new(p[0], p[1] * stretch, p[2]) + Vec3::new(0.8, 0.36, 0.48) * shift).into();
     let pose = [mesh.position.clone(), mesh.position.iter().map(moved).collect()];
     Frames::new(mesh, pose)
 }
@@ -90,10 +89,16 @@ fn two_sides_beat_one_and_the_fixed_point_beats_both() {
     for (case, frames) in &cases {
         let error = frames.schemes();
         for (n, e) in name.iter().zip(error) {
-            println!("{case}: {n}: mean {:.3}, 99 % {:.3}, most {:.3} voxels", e[0] / VOXEL, e[1] / VOXEL, e[2] / VOXEL);
+            println!(
+                "{case}: {n}: mean {:.3}, 99 % {:.3}, most {:.3} voxels",
+                e[0] / VOXEL,
+                e[1] / VOXEL,
+                e[2] / VOXEL
+            );
         }
         let [naive, forward, paper, ours] = error.map(|e| e[1]);
-        assert!(ours <= 1.05 * paper && ours <= 1.05 * forward && ours < naive, "{case}");
+        let slack = 0.02 * VOXEL;
+        assert!(ours <= paper + slack && ours <= forward + slack && ours < naive, "{case}");
         assert!(error[3][2] < 0.5 * VOXEL, "{case}");
     }
 }
@@ -149,4 +154,25 @@ fn bounds_between_frames_are_lower_bounds() {
             assert!(d.distance_bound(p, alpha) <= exact.max(0.0) + 1e-9);
         }
     }
+}
+
+/// A frame whose mesh is not a number leaves the other frame's; two such frames are nowhere.
+#[test]
+fn a_frame_without_a_mesh_is_passed_over() {
+    let mut frames = sphere(0.02, 0.0, 1.0);
+    let bad = vec![[f64::NAN; 3]; frames.mesh.position.len()];
+    let bvh = Bvh::build(&bad, &frames.mesh.triangle, &frames.topology);
+    let settings = FieldSettings::default();
+    let lost = Field::build(&bad, &frames.mesh.triangle, &frames.topology, &bvh, &settings, None);
+    frames.flow[1] = lost.flow(&frames.mesh.triangle, &bad);
+    frames.field[1] = lost;
+    let d = frames.deforming();
+    let p = Vec3::new(0.12, 0.01, 0.0);
+    for alpha in [0.0, 0.5, 1.0] {
+        let hit = d.sample(p, alpha);
+        assert!(hit.distance.is_finite() && hit.velocity.norm().is_finite() && hit.normal.norm() > 0.99);
+        assert!(d.distance_bound(p, alpha).is_finite());
+    }
+    let d = Deforming { field: [d.field[1]; 2], flow: [d.flow[1]; 2], ..d };
+    assert_eq!(d.sample(p, 0.0).distance, f64::INFINITY);
 }

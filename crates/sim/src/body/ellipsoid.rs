@@ -35,9 +35,8 @@ impl Ellipsoid {
         let (value, vector) = eigen::symmetric([0, 1, 2].map(|i| [0, 1, 2].map(|j| second[(i, j)])));
         let [x, y, z] = vector.map(Vec3::from);
         let z = if x.cross(&y).dot(&z) < 0.0 { -z } else { z };
-        let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[
-            x, y, z,
-        ])));
+        let turn =
+            UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, y, z])));
         let c = turn.coords;
         let placement = Rigid { rotation: [c.x, c.y, c.z, c.w], translation: mean.into() };
         Some(Ellipsoid { placement, semi_axes: value.map(|v| (3.0 * v.max(0.0)).sqrt()) })
@@ -69,20 +68,22 @@ impl Ellipsoid {
         let tiny = 1e-10 * a.max();
         let abs = y.map(|c| c.abs().max(tiny));
         let square = a.component_mul(&a);
+        // u = t + the shortest semi-axis squared keeps its digits where it is small.
+        let excess = square.map(|s| s - square.min());
         let ay = a.component_mul(&abs);
         // At each of these one term is 1.
-        let mut t = (ay - square).max();
+        let mut u = (ay - excess).max();
         for _ in 0..ITERATIONS {
-            let q = ay.component_div(&square.map(|s| s + t));
+            let q = ay.component_div(&excess.map(|e| e + u));
             let f = q.norm_squared() - 1.0;
-            let slope = -2.0 * (0..3).map(|i| q[i] * q[i] / (t + square[i])).sum::<f64>();
+            let slope = -2.0 * (0..3).map(|i| q[i] * q[i] / (u + excess[i])).sum::<f64>();
             let step = -f / slope;
-            if !(step > 1e-15 * (t.abs() + square.min())) {
+            if step <= 1e-15 * u || step.is_nan() {
                 break;
             }
-            t += step;
+            u += step;
         }
-        let x = square.component_mul(&abs).component_div(&square.map(|s| s + t));
+        let x = square.component_mul(&abs).component_div(&excess.map(|e| e + u));
         let outward = x.component_div(&square).normalize();
         let inside = y.component_div(&a).norm_squared() < 1.0;
         let gap = (abs - x).norm();
@@ -110,10 +111,7 @@ mod tests {
 
     fn some(semi_axes: [f64; 3]) -> Ellipsoid {
         let q = UnitQuaternion::from_scaled_axis(Vec3::new(0.3, -0.8, 0.5)).coords;
-        Ellipsoid {
-            placement: Rigid { rotation: [q.x, q.y, q.z, q.w], translation: [0.3, -0.1, 0.2] },
-            semi_axes,
-        }
+        Ellipsoid { placement: Rigid { rotation: [q.x, q.y, q.z, q.w], translation: [0.3, -0.1, 0.2] }, semi_axes }
     }
 
     /// Distance by a fine net of points on the surface, refined around the best.

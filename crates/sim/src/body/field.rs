@@ -5,9 +5,11 @@
 //! interpolation of the coarse corners beyond it, so that the field is continuous where bricks end: on a face towards a
 //! cell without a brick both sides are the same bilinear function.
 
+mod build;
+
 use super::Hit;
 use crate::Vec3;
-use pelage_geom::{Bvh, Closest, NONE, SurfacePoint, Topology};
+use pelage_geom::{Bvh, NONE, SurfacePoint, Topology};
 use rayon::prelude::*;
 
 /// Samples along a brick's side. With 4 a brick is mostly border, which neighbours store again; with 16 most samples of
@@ -16,22 +18,22 @@ const SIDE: usize = 8;
 const CELLS: usize = SIDE - 1;
 const SAMPLES: usize = SIDE * SIDE * SIDE;
 
-/// Voxels over which exact distances go over into coarse ones beyond the band. With less than one the gradient there is
-/// off by the whole error of the coarse lattice over one voxel; each more costs as many exact queries as band.
-const BLEND: f64 = 2.0;
+/// Voxels from the surface within which all samples are exact; farther out those between nodes are interpolated from
+/// them, off by about voxel^2 / distance near a sharp feature. With 1 that shows in contact distances around ears and
+/// noses; with 4 building takes twice as long.
+const NEAR: f64 = 2.0;
 
-/// Most cells of the coarse lattice. Voxels are made larger to keep to it: at about 1 us a corner building stays below
-/// seconds, and a body scaled by a thousand doesn't fill the memory. A standing figure at 4 mm needs 30,000.
-const MOST_CELLS: f64 = 131_072.0;
+/// Stands for no known foot.
+const NOWHERE: SurfacePoint = SurfacePoint { triangle: NONE, bary: [0.0; 2] };
 
 /// How finely and how far from the surface a field is sampled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldSettings {
     /// Distance between samples, metres; above 0.
     pub voxel: f64,
-    /// Distance outside the surface up to which samples are exact, metres.
+    /// Distance outside the surface up to which there are fine samples, metres.
     pub outside: f64,
-    /// Distance inside the surface up to which samples are exact, metres.
+    /// Distance inside the surface up to which there are fine samples, metres.
     pub inside: f64,
 }
 
@@ -75,7 +77,7 @@ pub struct Flow {
 
 /// Where a point lies among eight samples.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+struct Place {
     base: usize,
     stride: [usize; 2],
     /// Fractions between them.
@@ -109,7 +111,7 @@ impl Field {
             open_edges: topology.counts.open_edges,
             not_finite: position.iter().filter(|p| !finite(p)).count(),
             settings: *settings,
-            mesh: mesh_bounds(position, triangle),
+            mesh: build::mesh_bounds(position, triangle),
             ..Field::default()
         };
         if !field.lay_lattice(region) {
@@ -129,7 +131,8 @@ impl Field {
 
     /// Memory held, bytes.
     pub fn bytes(&self) -> usize {
-        4 * (self.brick.len() + self.centre.len() + self.distance.len()) + 12 * (self.foot.len() + self.corner_foot.len())
+        4 * (self.brick.len() + self.centre.len() + self.distance.len())
+            + 12 * (self.foot.len() + self.corner_foot.len())
     }
 
     /// Number of bricks.
@@ -180,8 +183,9 @@ impl Field {
             let g = f.map(|f| f * CELLS as f64);
             let near = g.map(|g| (g + 0.5) as usize);
             let at = brick as usize + near[0] + SIDE * (near[1] + SIDE * near[2]);
-            // Samples outside the band hold at least its width.
-            let known = f64::from(self.distance[at]).min(self.settings.outside);
+            // Farther samples hold no less than this but may hold too much.
+            let sure = self.settings.outside.min(NEAR * self.settings.voxel);
+            let known = f64::from(self.distance[at]).min(sure);
             let short = off(self.settings.voxel, std::array::from_fn(|i| g[i] - near[i] as f64));
             bound = bound.max(known - known.abs() * 1e-6 - short);
         }
@@ -216,8 +220,13 @@ impl Field {
         Flow { velocity: value, fastest }
     }
 
+    /// Velocity of the surface closest to a point; zero without a lattice.
+    pub(super) fn carried(&self, flow: &Flow, p: Vec3) -> Vec3 {
+        if self.cells[0] == 0 { Vec3::zeros() } else { flow.at(&self.locate(p).0) }
+    }
+
     /// The eight samples around a point, and how far beyond the lattice it is.
-    pub(super) fn locate(&self, p: Vec3) -> (Place, Vec3) {
+    fn locate(&self, p: Vec3) -> (Place, Vec3) {
         let q = self.clamp(p);
         let (cell, f) = self.cell(q);
         let brick = self.brick[self.index(cell)];
@@ -237,7 +246,7 @@ impl Field {
     }
 
     /// Distance and its gradient.
-    pub(super) fn value(&self, place: &Place) -> (f64, Vec3) {
+    fn value(&self, place: &Place) -> (f64, Vec3) {
         let d = &self.distance;
         let [tx, ty, tz] = place.t;
         let row = |k: usize| (f64::from(d[k]), f64::from(d[k + 1]) - f64::from(d[k]));
@@ -311,7 +320,7 @@ impl Field {
 
 impl Flow {
     /// Trilinear velocity.
-    pub(super) fn at(&self, place: &Place) -> Vec3 {
+    fn at(&self, place: &Place) -> Vec3 {
         let v = &self.velocity;
         let [tx, ty, tz] = place.t;
         let [sy, sz] = place.stride;
@@ -338,224 +347,13 @@ impl Place {
     }
 }
 
-// Building.
-impl Field {
-    /// Chooses domain, voxel and cells; false if there is nothing to sample.
-    fn lay_lattice(&mut self, region: Option<Bounds>) -> bool {
-        let (mut low, mut high) = self.mesh;
-        if !(low[0] <= high[0]) {
-            return false;
-        }
-        let longest = (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max);
-        // A point has no size of its own to choose voxels by.
-        let smallest = if longest > 0.0 { longest * 1e-4 } else { 1e-6 };
-        let voxel = if self.settings.voxel.is_finite() { self.settings.voxel.max(smallest) } else { smallest };
-        let margin = self.settings.outside.max(0.0) + BLEND * voxel;
-        for i in 0..3 {
-            low[i] -= margin;
-            high[i] += margin;
-            if let Some((from, to)) = region {
-                low[i] = low[i].max(from[i] - voxel);
-                high[i] = high[i].min(to[i] + voxel);
-            }
-            if !(low[i] < high[i]) {
-                return false;
-            }
-        }
-        let cells = |voxel: f64| [0, 1, 2].map(|i| ((high[i] - low[i]) / (CELLS as f64 * voxel)).ceil().max(1.0));
-        self.settings.voxel = voxel;
-        while cells(self.settings.voxel).iter().product::<f64>() > MOST_CELLS {
-            self.settings.voxel *= 1.25;
-        }
-        self.cells = cells(self.settings.voxel).map(|n| n as usize);
-        self.per_voxel = 1.0 / self.settings.voxel;
-        self.domain = (low, std::array::from_fn(|i| low[i] + self.cells[i] as f64 * self.cell_size()));
-        true
-    }
-
-    /// Exact distances at the coarse corners.
-    fn sample_corners(&mut self, bvh: &Bvh) {
-        let [nx, ny, _] = self.cells.map(|n| n + 1);
-        let size = self.cell_size();
-        let rows: Vec<usize> = (0..self.corners() / nx).collect();
-        let low = self.domain.0;
-        let sampled: Vec<Vec<Closest>> = rows
-            .par_iter()
-            .map(|&row| {
-                let mut limit = f64::INFINITY;
-                let corner = |i: usize| Vec3::from(low) + Vec3::new(i as f64, (row % ny) as f64, (row / ny) as f64) * size;
-                let at = |i: usize| {
-                    let found = query(bvh, corner(i), limit);
-                    limit = (corner(i + 1) - found.position).norm();
-                    found
-                };
-                (0..nx).map(at).collect()
-            })
-            .collect();
-        for c in sampled.into_iter().flatten() {
-            self.distance.push(c.signed_distance as f32);
-            self.foot.push(c.point);
-            self.corner_foot.push([c.position.x as f32, c.position.y as f32, c.position.z as f32]);
-        }
-    }
-
-    /// Distances at the cells' centres; returns the cells that need a brick: all others lie outside the band and the
-    /// blend with all their points, on one side of the surface.
-    fn sample_centres(&mut self, bvh: &Bvh) -> Vec<usize> {
-        let size = self.cell_size();
-        let radius = 0.5 * 3f64.sqrt() * size;
-        let centres: Vec<f64> = (0..self.cells.iter().product())
-            .into_par_iter()
-            .map(|cell: usize| {
-                let centre = self.corner_of(cell) + Vec3::repeat(0.5 * size);
-                let foot = self.corner_foot[self.coarse(self.cell_at(cell), [0.0; 3]).base].map(f64::from);
-                query(bvh, centre, (centre - Vec3::from(foot)).norm() * (1.0 + 1e-6)).signed_distance
-            })
-            .collect();
-        self.centre = centres.iter().map(|&d| (d - d.abs() * 1e-6) as f32).collect();
-        let needs = |d: f64| d.abs() <= radius + self.width(d) + BLEND * self.settings.voxel;
-        (0..centres.len()).filter(|&cell| needs(centres[cell])).collect()
-    }
-
-    /// Lowest corner of a cell.
-    fn corner_of(&self, cell: usize) -> Vec3 {
-        Vec3::from(self.domain.0) + Vec3::from(self.cell_at(cell).map(|i| i as f64)) * self.cell_size()
-    }
-
-    /// The band on the side of a distance, metres.
-    fn width(&self, d: f64) -> f64 {
-        if d < 0.0 { self.settings.inside } else { self.settings.outside }
-    }
-
-    /// Fills the bricks of the `active` cells with what each owns: samples but those on faces that the next cell owns.
-    fn sample_bricks(&mut self, bvh: &Bvh, active: &[usize]) {
-        self.brick = vec![NONE; self.centre.len()];
-        for (k, &cell) in active.iter().enumerate() {
-            self.brick[cell] = (self.corners() + k * SAMPLES) as u32;
-        }
-        let bricks: Vec<_> = active.par_iter().map(|&cell| self.sample_brick(bvh, cell)).collect();
-        for (distance, foot) in bricks {
-            self.distance.extend(distance);
-            self.foot.extend(foot);
-        }
-    }
-
-    /// Walks through a brick, to and fro, and asks for exact distances where the last one leaves open whether the sample
-    /// lies in the band; the last one also limits the search.
-    fn sample_brick(&self, bvh: &Bvh, cell: usize) -> ([f32; SAMPLES], [SurfacePoint; SAMPLES]) {
-        let nowhere = SurfacePoint { triangle: NONE, bary: [0.0; 2] };
-        let (mut distance, mut foot) = ([0.0; SAMPLES], [nowhere; SAMPLES]);
-        let (corner, voxel, at) = (self.corner_of(cell), self.settings.voxel, self.cell_at(cell));
-        let own = self.owned(cell);
-        let mut sign = f64::from(self.centre[cell]);
-        // At least this far from the surface, and a point of that.
-        let mut least = sign.abs() * (1.0 - 1e-5) - 0.5 * 3f64.sqrt() * self.cell_size();
-        let mut last = Vec3::from(self.corner_foot[self.coarse(at, [0.0; 3]).base].map(f64::from));
-        for step in 0..own.iter().product() {
-            let [i, j, k] = to_and_fro(step, own);
-            let n = i + SIDE * (j + SIDE * k);
-            let coarse = self.coarse(at, [i, j, k].map(|i| i as f64 / CELLS as f64));
-            let coarse = coarse.blend(|k| f64::from(self.distance[k]));
-            let (band, blend) = (self.width(sign), BLEND * voxel);
-            let clear = |d: f64| sign.signum() * (d * sign.signum()).max(self.width(sign));
-            if least > band + blend {
-                distance[n] = clear(coarse) as f32;
-            } else {
-                let p = corner + Vec3::new(i as f64, j as f64, k as f64) * voxel;
-                let found = query(bvh, p, (p - last).norm() * (1.0 + 1e-6));
-                let d = found.signed_distance;
-                (sign, least, last, foot[n]) = (d, d.abs(), found.position, found.point);
-                let t = ((d.abs() - self.width(d)) / blend).clamp(0.0, 1.0);
-                let clear = |x: f64| d.signum() * (x * d.signum()).max(self.width(d));
-                distance[n] = if t > 0.0 { clear(d + t * (coarse - d)) } else { d } as f32;
-                if t == 1.0 {
-                    foot[n] = nowhere;
-                }
-            }
-            least -= voxel;
-        }
-        (distance, foot)
-    }
-
-    /// Samples that a brick owns along each axis: all but the last, unless no cell follows.
-    fn owned(&self, cell: usize) -> [usize; 3] {
-        let b = self.cell_at(cell);
-        std::array::from_fn(|i| if b[i] + 1 == self.cells[i] { SIDE } else { CELLS })
-    }
-
-    /// Fills the faces that the next cells own: from their bricks, or from the coarse corners where they have none.
-    fn join_bricks(&mut self, active: &[usize]) {
-        let faces: Vec<Vec<(u32, f32, SurfacePoint)>> = active
-            .par_iter()
-            .map(|&cell| {
-                let (b, own) = (self.cell_at(cell), self.owned(cell));
-                let mut face = Vec::new();
-                for n in 0..SAMPLES {
-                    let i = split(n);
-                    if (0..3).all(|a| i[a] < own[a]) {
-                        continue;
-                    }
-                    let next: [usize; 3] = std::array::from_fn(|a| b[a] + usize::from(i[a] >= own[a]));
-                    let local: [usize; 3] = std::array::from_fn(|a| if i[a] >= own[a] { 0 } else { i[a] });
-                    let brick = self.brick[self.index(next)];
-                    face.push(if brick == NONE {
-                        let place = self.coarse(b, i.map(|i| i as f64 / CELLS as f64));
-                        let d = place.blend(|k| f64::from(self.distance[k]));
-                        (n as u32, d as f32, SurfacePoint { triangle: NONE, bary: [0.0; 2] })
-                    } else {
-                        let at = brick as usize + local[0] + SIDE * (local[1] + SIDE * local[2]);
-                        (n as u32, self.distance[at], self.foot[at])
-                    });
-                }
-                face
-            })
-            .collect();
-        for (&cell, face) in active.iter().zip(faces) {
-            let base = self.brick[cell] as usize;
-            for (n, d, foot) in face {
-                self.distance[base + n as usize] = d;
-                self.foot[base + n as usize] = foot;
-            }
-        }
-    }
-}
-
 /// Coordinates of sample `n` in its brick.
 fn split(n: usize) -> [usize; 3] {
     [n % SIDE, n / SIDE % SIDE, n / (SIDE * SIDE)]
 }
 
-/// Step `n` of a walk through a block of `size` samples in which each is beside the one before.
-fn to_and_fro(n: usize, size: [usize; 3]) -> [usize; 3] {
-    let (row, k) = (n / size[0], n / (size[0] * size[1]));
-    let back = |i: usize, size: usize, turn: usize| if turn % 2 == 0 { i } else { size - 1 - i };
-    [back(n % size[0], size[0], row), back(row % size[1], size[1], k), k]
-}
-
-/// Closest point; `limit`: an upper bound of the distance but for rounding.
-fn query(bvh: &Bvh, p: Vec3, limit: f64) -> Closest {
-    let found = bvh.closest(p, limit * (1.0 + 1e-9) + 1e-12).or_else(|| bvh.closest(p, f64::INFINITY));
-    let point = SurfacePoint { triangle: NONE, bary: [0.0; 2] };
-    found.unwrap_or(Closest { point, position: p, signed_distance: f64::MAX, normal: Vec3::y() })
-}
-
 fn finite(p: &[f64; 3]) -> bool {
     p.iter().all(|x| x.is_finite())
-}
-
-/// Box of the triangles that are finite; infinite and empty (low above high) without any.
-fn mesh_bounds(position: &[[f64; 3]], triangle: &[[u32; 3]]) -> Bounds {
-    let corner = |t: &[u32; 3]| t.map(|v| position[v as usize]);
-    let mut bounds = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for c in triangle.iter().map(corner).filter(|c| c.iter().all(finite)) {
-        for p in c {
-            for i in 0..3 {
-                bounds.0[i] = bounds.0[i].min(p[i]);
-                bounds.1[i] = bounds.1[i].max(p[i]);
-            }
-        }
-    }
-    bounds
 }
 
 /// Nearest point of a box; the point itself for an empty one.

@@ -31,8 +31,10 @@ fn a_sphere_is_within_the_error_of_trilinear_interpolation() {
     assert!(near.len() > 2000);
     for (p, _) in near {
         let s = field.sample(p);
-        // Two curvatures of 1 / r over a voxel: h^2 / 8 each; the mesh lies up to 3e-5 inside the sphere.
-        let allowed = 0.004f64.powi(2) / 4.0 / (p.norm() - 0.004) + 3e-5;
+        // Two curvatures of 1 / r over a cell: h^2 / 8 each, h being two voxels away from the surface; the mesh lies
+        // up to 3e-5 inside the sphere.
+        let h = if (p.norm() - 0.1).abs() < 0.004 { 0.004 } else { 0.008 };
+        let allowed = h * h / 4.0 / (p.norm() - 0.004) + 3e-5;
         assert!((s.distance - (p.norm() - 0.1)).abs() < allowed, "{p}: {} {}", s.distance, p.norm() - 0.1);
         assert!(s.normal.dot(&p.normalize()) > 0.998, "{}", s.normal.dot(&p.normalize()));
     }
@@ -60,7 +62,11 @@ fn the_bust_is_within_half_a_voxel() {
         band(&mesh, &bvh, 100_000).iter().map(|(p, d)| (field.sample(*p).distance - d).abs()).collect();
     off.sort_by(f64::total_cmp);
     let (mean, last) = (off.iter().sum::<f64>() / off.len() as f64, off[off.len() - 1]);
-    println!("bust, {} points: mean {mean:.2e}, 99.9 % {:.2e}, most {last:.2e} m", off.len(), off[off.len() * 999 / 1000]);
+    println!(
+        "bust, {} points: mean {mean:.2e}, 99.9 % {:.2e}, most {last:.2e} m",
+        off.len(),
+        off[off.len() * 999 / 1000]
+    );
     assert!(mean < 0.02 * 0.004 && last < 0.5 * 0.004);
 }
 
@@ -158,7 +164,11 @@ fn far_points_have_a_usable_distance_and_normal() {
         let s = field.sample(p);
         assert!((s.normal.norm() - 1.0).abs() < 1e-12);
         if p.norm() > 0.2 {
-            assert!((s.distance - (p.norm() - 0.1)).abs() < 0.025, "{p} {}", s.distance - (p.norm() - 0.1));
+            assert!(
+                (s.distance - (p.norm() - 0.1)).abs() < 0.012 + 0.04 * p.norm(),
+                "{p} {}",
+                s.distance - (p.norm() - 0.1)
+            );
             assert!(s.normal.dot(&p.normalize()) > 0.98, "{p} {}", s.normal);
         }
     }
@@ -216,7 +226,7 @@ fn a_huge_body_gets_larger_voxels() {
     let mut mesh = cube_sphere(8, 0.1);
     mesh.position.iter_mut().flatten().for_each(|x| *x *= 1000.0);
     let (field, bvh) = with(&mesh, &FINE, None);
-    assert!(field.voxel() > 0.1 && field.centre.len() <= MOST_CELLS as usize);
+    assert!(field.voxel() > 0.1 && field.centre.len() <= build::MOST_CELLS as usize);
     let p = Vec3::new(103.0, 20.0, 10.0);
     assert!((field.sample(p).distance - exact(&bvh, p)).abs() < field.voxel());
 }
@@ -233,63 +243,4 @@ fn the_same_bytes_for_any_number_of_threads() {
         let more = build(threads);
         assert!(one.distance == more.distance && one.foot == more.foot && one.centre == more.centre);
     }
-}
-
-#[test]
-fn timing() {
-    let mesh = metres(bust().mesh);
-    let topology = Topology::new(&mesh);
-    let bvh = Bvh::build(&mesh.position, &mesh.triangle, &topology);
-    let cpu = || {
-        let s = std::fs::read_to_string("/proc/self/stat").unwrap();
-        s.rsplit(") ").next().unwrap().split(' ').nth(11).unwrap().parse::<f64>().unwrap() * 10.0
-    };
-    let c = cpu();
-    for _ in 0..5 {
-        let f = Field::build(&mesh.position, &mesh.triangle, &topology, &bvh, &FieldSettings::default(), None);
-        println!("bricks {} of {} bytes {} known {}", f.bricks(), f.brick.len(), f.bytes(), f.foot.iter().filter(|f| f.triangle != NONE).count());
-    }
-    println!("{} ms cpu a build", (cpu() - c) / 5.0);
-    let f = Field::build(&mesh.position, &mesh.triangle, &topology, &bvh, &FieldSettings::default(), None);
-    let near: Vec<Vec3> = (0..1000000).map(|i| random_in(i, [-0.2; 3], [0.2; 3])).filter(|p| f.sample(*p).distance.abs() < 0.01).collect();
-    let far: Vec<Vec3> = (0..100000).map(|i| random_in(i, [-0.2; 3], [0.2; 3])).filter(|p| f.sample(*p).distance > 0.04).collect();
-    for (name, pts) in [("near", near), ("far", far)] {
-        let c = cpu();
-        let mut s = 0.0;
-        let rep = 10_000_000 / pts.len();
-        for _ in 0..rep { for p in &pts { s += f.sample(*p).distance; } }
-        let t = cpu() - c;
-        let c = cpu();
-        for _ in 0..rep { for p in &pts { s += f.distance_bound(*p); } }
-        let tb = cpu() - c;
-        let c = cpu();
-        for p in &pts[..50000.min(pts.len())] { let d = f.sample(*p).distance.abs() + 0.004; s += bvh.closest(*p, d).map_or(0.0, |c| c.signed_distance); }
-        let tq = (cpu() - c) * 1e6 / 50000.min(pts.len()) as f64;
-        println!("{name} {} sample {} ns bound {} ns closest {tq} ns {s}", pts.len(), t * 1e6 / (rep * pts.len()) as f64, tb * 1e6 / (rep * pts.len()) as f64);
-    }
-}
-#[test]
-fn timing2() {
-    let mesh = metres(bust().mesh);
-    let (f, bvh) = with(&mesh, &FINE, None);
-    let cells = f.cells_with_bricks();
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    let sched = || std::fs::read_to_string("/proc/thread-self/schedstat").unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
-    let t = sched();
-    let mut n = 0usize;
-    for &c in &cells { let (d, foot) = f.sample_brick(&bvh, c); n += foot.iter().filter(|f| f.triangle != NONE).count(); std::hint::black_box(d); }
-    println!("bricks {} ms, {n} feet, {} ns", (sched() - t) / 1e6, (sched() - t) / n as f64);
-    let t = sched();
-    let mut s = 0.0;
-    let mut n = 0;
-    for d in [0.001, 0.005, 0.01, 0.02, 0.028] {
-        let t = sched();
-        for (k, p) in mesh.position.iter().enumerate().take(9000).step_by(3) {
-            let p = Vec3::from(*p) + random_in(k as u64, [-1.0; 3], [1.0; 3]).normalize() * d;
-            let c = bvh.closest(p, d).map_or(0.0, |c| c.signed_distance);
-            s += c; n += 1;
-        }
-        println!("{d}: {} ns", (sched() - t) / 3000.0);
-    }
-    let _ = (t, n, s, pool);
 }

