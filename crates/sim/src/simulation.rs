@@ -173,8 +173,8 @@ pub struct Span<'a> {
     pub body: &'a Body<'a>,
     /// Gravity at the beginning and at the end, metres per second squared.
     pub gravity: [[f64; 3]; 2],
-    /// The wind.
-    pub wind: Option<&'a Wind>,
+    /// The wind at the beginning and at the end.
+    pub wind: Option<[&'a Wind; 2]>,
 }
 
 /// A strand that had to be stiffened so that its groomed pose can stand.
@@ -763,11 +763,12 @@ impl Around for Scene<'_> {
         }
         let time = self.span.time + fraction * self.span.seconds;
         let still = drag::Air::default();
+        let wind = self.span.wind.map(|[a, b]| Wind::lerp(a, b, fraction));
         let mut point: Vec<Vec3> = Vec::new();
         let mut blowing = vec![Vec3::zeros(); g.node.len()];
         for l in (0..LANES).filter(|&l| lanes[l] && g.strand[l].is_some()) {
             let n = g.count[l];
-            if let Some(wind) = self.span.wind {
+            if let Some(wind) = &wind {
                 point.clear();
                 point.extend((0..n).map(|i| g.x(i, l)));
                 wind.free_along(&point, WIND_STRIDE, time, &mut blowing[..n]);

@@ -346,7 +346,7 @@ fn advance(
         let begin = roots(&before, None, unit);
         let ends = roots(&now, Some(&begin), unit);
         let motion = |f: f64| timeline.rigid(arrival, from + f).map_or(Rigid::default(), |t| placement(&t, unit));
-        let wind = wind.map(|w| Wind { velocity: w.velocity.vectors().at(from + 0.5) });
+        let winds = wind.map(|w| [from, frame as f64].map(|f| blowing(w, f)));
         let span = Span {
             seconds: 1.0 / shot.shot.fps,
             time: timeline.seconds(from),
@@ -354,7 +354,8 @@ fn advance(
             roots: [&begin, &ends],
             body: &Body::default(),
             gravity: [gravity.at(from), gravity.at(frame as f64)],
-            wind: wind.as_ref(),
+            wind: winds.as_ref().map(|[a, b]| [a, b]),
+            tips: None,
         };
         let clock = Instant::now();
         let ticker = run.ticker(&format!("{layer} {frame}"));
@@ -379,6 +380,11 @@ fn advance(
     Ok(())
 }
 
+/// The wind at a frame.
+fn blowing(w: &WindSettings, frame: f64) -> Wind {
+    Wind { velocity: w.velocity.vectors().at(frame), ..Wind::default() }
+}
+
 fn frame_bytes(frame: i64, positions: &[[f32; 3]]) -> Vec<u8> {
     let mut file = std::io::Cursor::new(Vec::with_capacity(positions.len() * 12 + 4096));
     let frame = i32::try_from(frame).expect("a frame of the shot");
@@ -399,7 +405,7 @@ fn note(run: &mut Runner<'_>, layer: &str, frame: i64, r: &SpanReport, counts: &
         *at = n.max(*at);
     };
     most(SLEEPING, r.sleeping);
-    most("points in contact", r.contacts);
+    most("points that the mesh pushed out", r.corrected);
     most("strands that took steps of their own", r.subdivided);
     most("largest strain, millionths", (r.largest_strain * 1e6).round() as u64);
     let values = [r.particle_steps, r.teleported, r.held.len() as u64, r.bad_roots.len() as u64];

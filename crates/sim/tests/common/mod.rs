@@ -64,7 +64,7 @@ impl Shot {
             tips: tips.as_deref().map(|t| [t, t]),
             body,
             gravity: [self.gravity; 2],
-            wind,
+            wind: wind.map(|w| [w, w]),
         };
         self.last = self.sim.advance(&span, &|_| true).unwrap();
         self.time += seconds;
