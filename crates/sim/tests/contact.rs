@@ -4,11 +4,12 @@ mod common;
 
 use common::{GRAVITY, Shot, Vec3, turned};
 use pelage_geom::{Bvh, Topology, shapes};
-use pelage_sim::body::{Exact, Field, FieldSettings};
-use pelage_sim::{Body, Part, Settings, Shape};
+use pelage_geom::Mesh;
+use pelage_sim::{Body, Exact, Field, FieldSettings, Part, Settings, Shape};
 
 /// A ball as a mesh with its field.
 struct Ball {
+    mesh: Mesh,
     bvh: Bvh,
     field: Field,
 }
@@ -19,7 +20,7 @@ fn ball(radius: f64) -> Ball {
     let bvh = Bvh::build(&mesh.position, &mesh.triangle, &topology);
     let field =
         Field::build(&mesh.position, &mesh.triangle, &topology, &bvh, &FieldSettings::default(), None);
-    Ball { bvh, field }
+    Ball { mesh, bvh, field }
 }
 
 /// Hairs that stand on the upper half of a ball and lean over.
@@ -59,7 +60,7 @@ fn hair_on_a_shaking_ball_stays_outside() {
                 parts: vec![Part {
                     motion: &motion,
                     shape: Shape::Field(&b.field),
-                    exact: Some(Exact { bvh: &b.bvh, velocity: None }),
+                    exact: Some(Exact { bvh: &b.bvh, triangle: &b.mesh.triangle, velocity: None }),
                 }],
                 seconds: 1.0 / 24.0,
             };

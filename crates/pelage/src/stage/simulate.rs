@@ -1,17 +1,18 @@
 //! Simulate: hair in motion, one stretch of frames after another, each from the checkpoint at the end of the one before.
 
+use super::body::SkinBody;
 use super::run::{Counts, Runner};
 use super::{What, groom, instance, interpolate};
 use crate::Error;
 use crate::cache::LongStep;
-use crate::config::{StrandModel, Target};
+use crate::config::{StrandModel, Target, WindSettings};
 use crate::format::{mcap, ply};
 use crate::project::SkinAt;
 use crate::timeline::Timeline;
 use pelage_geom::ride::{Ride, ease_positions, rides};
 use pelage_geom::{Offsets, Pose, SurfacePoint, Vec3};
 use pelage_groom::control;
-use pelage_sim::{Body, Hairs, Model, Rigid, Root, Settings, SimError, Simulation, Span, SpanReport, Started, Wind};
+use pelage_sim::{FieldSettings, Hairs, Model, Rigid, Root, Settings, SimError, Simulation, Span, SpanReport, Started, Wind};
 use rayon::prelude::*;
 use std::time::Instant;
 
@@ -39,6 +40,7 @@ pub(super) struct Running {
     frame: i64,
     sim: Simulation,
     source: Source,
+    skin: SkinBody,
 }
 
 /// Hairs at rest, as they are simulated.
@@ -166,7 +168,10 @@ fn start(run: &mut Runner<'_>, i: usize, timeline: &Timeline<'_>) -> Result<(Run
     let hairs = Hairs { offsets: &source.offsets, position: &source.position, id: &source.id };
     let gravity = shot.simulate.gravity.downward(shot.shot.up).at(timeline.start() as f64);
     let (sim, started) = Simulation::new(&hairs, &settings, gravity).map_err(|e| failed(run, i, &e))?;
-    let running = Running { layer: i, frame: timeline.start(), sim, source };
+    let skin = groom::skin(run)?;
+    let unit = run.project.shot.value.shot.meters_per_unit;
+    let skin = SkinBody::new(&skin, unit, FieldSettings::default(), &source.offsets, &source.position);
+    let running = Running { layer: i, frame: timeline.start(), sim, source, skin };
     if timeline.preroll == 0 {
         check_at_rest(run, timeline, &running.source)?;
     }
@@ -276,20 +281,30 @@ fn root_rides(run: &mut Runner<'_>, timeline: &Timeline<'_>, source: &Source, fr
         let on_skin = |p: &SurfacePoint| Ride::still(p.blend(skin.corners(p)).into());
         return Ok(source.root.iter().map(on_skin).collect());
     }
+    let position = skin_position(run, timeline, frame)?;
+    let pose = Pose::new(&skin.mesh, &skin.topology, position);
+    Ok(rides(&skin.mesh, &skin.topology, &skin.rest, &pose, &source.root))
+}
+
+/// Vertices of a skin that deforms, at a frame, scene units.
+fn skin_position(run: &mut Runner<'_>, timeline: &Timeline<'_>, frame: i64) -> Result<Vec<[f64; 3]>, Error> {
+    let skin = groom::skin(run)?;
+    let arrival = timeline.arrival();
     let read = |frame: i64| match timeline.skin_at(frame) {
         Some(SkinAt::File(file)) => Ok(ply::read_frame(&file.path, skin.mesh.position.len(), skin.faces())?),
         _ => Ok::<_, Error>(skin.mesh.position.clone()),
     };
-    let position = if frame >= arrival {
-        read(frame)?
-    } else {
-        let target = read(arrival)?;
-        let next = if timeline.skin_at(arrival + 1).is_some() { read(arrival + 1)? } else { target.clone() };
-        let (s, frames) = timeline.way(arrival, frame);
-        ease_positions(&skin.mesh.position, &target, &next, frames, s)
-    };
-    let pose = Pose::new(&skin.mesh, &skin.topology, position);
-    Ok(rides(&skin.mesh, &skin.topology, &skin.rest, &pose, &source.root))
+    if frame >= arrival {
+        return read(frame);
+    }
+    let target = read(arrival)?;
+    let next = if timeline.skin_at(arrival + 1).is_some() { read(arrival + 1)? } else { target.clone() };
+    let (s, frames) = timeline.way(arrival, frame);
+    Ok(ease_positions(&skin.mesh.position, &target, &next, frames, s))
+}
+
+fn positions_of(roots: &[Root]) -> Vec<[f64; 3]> {
+    roots.iter().map(|r| r.position).collect()
 }
 
 /// Without pre-roll the simulation starts at the first frame: there the skin must be at rest.
@@ -344,15 +359,27 @@ fn advance(
         let (from, frame) = (running.frame as f64, running.frame + 1);
         let now = root_rides(run, timeline, &running.source, frame)?;
         let begin = roots(&before, None, unit);
+        let seconds = 1.0 / shot.shot.fps;
+        let arrival_rigid = timeline.rigid(arrival, from).is_some();
+        if arrival_rigid {
+            // A skin that moves as a whole is one solid in its rest coordinates.
+            let rest = groom::skin(run)?;
+            running.skin.go(0, &rest.mesh.position, &positions_of(&begin), seconds);
+        } else {
+            for (f, rides) in [(running.frame, &before), (frame, &now)] {
+                let position = skin_position(run, timeline, f)?;
+                running.skin.go(f, &position, &positions_of(&roots(rides, None, unit)), seconds);
+            }
+        }
         let ends = roots(&now, Some(&begin), unit);
         let motion = |f: f64| timeline.rigid(arrival, from + f).map_or(Rigid::default(), |t| placement(&t, unit));
         let winds = wind.map(|w| [from, frame as f64].map(|f| blowing(w, f)));
         let span = Span {
-            seconds: 1.0 / shot.shot.fps,
+            seconds,
             time: timeline.seconds(from),
             motion: &motion,
             roots: [&begin, &ends],
-            body: &Body::default(),
+            body: &running.skin.body(&motion, seconds),
             gravity: [gravity.at(from), gravity.at(frame as f64)],
             wind: winds.as_ref().map(|[a, b]| [a, b]),
             tips: None,
