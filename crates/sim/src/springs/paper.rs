@@ -33,7 +33,7 @@ use crate::band::{self, Column, HELD, Panel, RING, Window};
 use crate::lanes::{self, Kernel, Lanes, Pack, Width};
 
 /// Carried strain of altitudes is forgotten at this rate, per second: a collapsed strand is back within a second. Below 5
-/// it is not; above 1000 it is forgotten within a step.
+/// 1 % would be left after it; above 1000 it is forgotten within a step, and changes would give energy.
 pub const FORGET: f64 = 20.0;
 
 /// How a group steps.
