@@ -4,6 +4,9 @@
 //! spring joins a particle with one of the three before it, every altitude spring acts on four particles in a row, so a
 //! strand's matrix has a half-bandwidth of three particles.
 
+// Loops run over particles: an index reaches neighbours as well.
+#![allow(clippy::needless_range_loop)]
+
 pub mod calibrate;
 pub mod kernel;
 pub mod layout;
@@ -12,5 +15,7 @@ pub mod plain;
 pub mod sag;
 pub mod tetrahedron;
 
+#[cfg(test)]
+mod paper_tests;
 #[cfg(test)]
 mod tests;

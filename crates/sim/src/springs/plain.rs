@@ -14,7 +14,8 @@ use pelage_geom::NONE;
 
 /// Share of a segment's mass that its extra particle carries, taken from the segment's ends: the hair's mass stays. At
 /// 0.1 the extra particles' weight off the axis and their inertia in twisting show (first twisting frequency of a 20 cm
-/// hair: 300 Hz at 1e-3, 30 Hz at 0.1); below 1e-6 the matrix's condition suffers.
+/// hair: 300 Hz at 1e-3, 30 Hz at 0.1); nothing is
+/// gained below.
 pub const EXTRA_MASS: f64 = 1e-3;
 
 /// A tetrahedron whose least altitude at rest is below this fraction of its size is measured against this instead:
@@ -29,8 +30,8 @@ pub const HALF: f64 = -0.5;
 /// How much stiffer altitude springs are below [`HALF`]: then as stiff as torsion springs.
 pub const FIRM: f64 = 10.0;
 
-/// The altitude in use changes when another's `|u x v|` is this much larger, squared (20 %). At 1 it changes for ever at
-/// rest; at 2 the paper's bound on the weights is lost.
+/// The altitude in use changes when another's `|u x v|` is this much larger, squared (20 %). Nearer 1 the two equal
+/// altitudes of a straight hair take turns for ever; the larger, the farther are weights from the paper's 0 to 1.
 pub const HYSTERESIS: f64 = 1.44;
 
 /// Squared sine below which four particles count as colinear.
