@@ -233,7 +233,7 @@ fn without_preroll_the_skin_must_start_at_rest() {
     let out = shot.pelage(&["run"]);
     let said = String::from_utf8_lossy(&out.stderr);
     assert_eq!(out.status.code(), Some(2));
-    assert!(said.contains("shot.preroll: is 0, but the skin is not at its rest pose at frame 1"), "{said}");
+    assert!(said.contains("shot.preroll: is 0, but roots are not at their rest pose at frame 1"), "{said}");
 }
 
 #[test]

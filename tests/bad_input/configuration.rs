@@ -84,7 +84,7 @@ fn wrong_types_and_missing_tables() {
         ("\"grooms/ball.ply\"", "[\"grooms/ball.ply\"]", "line 8"),
         ("size = [160, 120]", "size = [160, -120]", "line"),
         ("[groom]\nfile = \"grooms/ball.toml\"\n", "", "groom"),
-        ("[groom]\nfile = \"grooms/ball.toml\"", "[groom]", "file"),
+        ("[groom]\nfile = \"grooms/ball.toml\"", "[groom]", "groom|where hair comes from|help:"),
         ("rest = \"grooms/ball.ply\"\n", "", "rest"),
         ("fps = 24\n", "", "fps"),
         ("meters_per_unit = 0.01\n", "", "meters_per_unit"),

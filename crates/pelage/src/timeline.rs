@@ -90,7 +90,8 @@ impl<'a> Timeline<'a> {
     pub fn rigid(&self, arrival: i64, frame: f64) -> Option<RigidTransform> {
         let Some(m) = &self.project.motion else {
             let still = RigidTransform { rotation: [0.0, 0.0, 0.0, 1.0], translation: [0.0; 3], pivot: [0.0; 3] };
-            return self.project.shot.value.skin.frames.is_none().then_some(still);
+            let deforms = self.project.shot.value.skin.as_ref().is_some_and(|s| s.frames.is_some());
+            return (!deforms).then_some(still);
         };
         let arrival = arrival as f64;
         if frame >= arrival {

@@ -22,11 +22,12 @@ pub struct Simulate {
     /// Model of a strand. Default: "rod".
     pub model: StrandModel,
     /// Segments of a simulated hair, equal in length; hairs simulated one by one are exported with one point more.
-    /// Default: 25.
+    /// Default: 25; for hair from a curves file its points as they are.
     pub segments: Option<usize>,
     /// Steps in a frame. Default: chosen from the motion of the skin.
     pub substeps: Option<u32>,
-    /// Start in equilibrium under gravity, so that the groomed pose stands as it was combed. Default: true.
+    /// Start in equilibrium under gravity, so that the hair stands as it was combed; false: its shape is the natural,
+    /// unloaded one. Default: true; false for hair from a curves file.
     pub sag_free: Option<bool>,
     /// Largest strain that is left in a segment: 0.01 is one percent. Default: 0.01.
     pub strain_limit: f64,
@@ -45,6 +46,8 @@ pub struct Simulate {
     pub gravity: Keyed<Amount>,
     /// The wind. Default: none.
     pub wind: Option<WindSettings>,
+    /// What hair from a curves file is made of. Layers of a groom say it themselves.
+    pub material: Option<Material>,
 }
 
 impl Default for Simulate {
@@ -63,6 +66,7 @@ impl Default for Simulate {
             checkpoint: CHECKPOINT,
             gravity: Keyed::constant(Amount::Number(9.81)),
             wind: None,
+            material: None,
         }
     }
 }
@@ -316,6 +320,9 @@ impl Document<ShotFile> {
         number("offset", s.offset, 0.0, 1e3, "it is in millimetres; 0.5 is usual")?;
         number("teleport", s.teleport, 1e-9, 1e9, "it is in metres; 1 is usual")?;
         number("checkpoint", f64::from(s.checkpoint), 1.0, 1e6, "24 is usual")?;
+        if let Some(material) = &s.material {
+            check_material(self, "simulate.material", material)?;
+        }
         let up = self.value.shot.up;
         self.keys("simulate.gravity", &s.gravity.downward(up), 1e6, "9.81 is the earth's, in m/s2")?;
         match &s.wind {

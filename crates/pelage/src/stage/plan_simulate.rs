@@ -72,11 +72,15 @@ impl Reader<'_> {
     fn settings(&self, r: Recipe) -> Recipe {
         let s = &self.project.shot.value.simulate;
         let substeps = s.substeps.map_or("automatic".to_owned(), |n| n.to_string());
+        let segments = match (&self.project.curves, s.segments) {
+            (Some(_), None) => "as they are".to_owned(),
+            _ => self.project.segments().to_string(),
+        };
         let values = [
             ("model", format!("{:?}", s.model).to_lowercase()),
-            ("segments", self.project.segments().to_string()),
+            ("segments", segments),
             ("substeps", substeps),
-            ("sag_free", s.sag_free.unwrap_or(true).to_string()),
+            ("sag_free", self.project.sag_free().to_string()),
             ("strain_limit", s.strain_limit.to_string()),
             ("friction", s.friction.to_string()),
             ("offset", s.offset.to_string()),
@@ -89,9 +93,9 @@ impl Reader<'_> {
     }
 
     fn material(&self, r: Recipe, i: usize) -> Recipe {
-        let values = self.project.groom.value.layer[i].material.values();
-        let label = |key: &str| self.in_groom(&format!("layer[{i}].material.{key}"));
-        values.into_iter().fold(r, |r, (key, x)| r.param(&format!("material.{key}"), x, label(key)))
+        let (at, material) = self.project.material(i);
+        let label = |key: &str| self.in_groom(&format!("{at}.{key}"));
+        material.values().into_iter().fold(r, |r, (key, x)| r.param(&format!("material.{key}"), x, label(key)))
     }
 
     /// Gravity and wind as they are from one frame to another.

@@ -1,7 +1,7 @@
 //! Simulate: hair in motion, one stretch of frames after another, each from the checkpoint at the end of the one before.
 
 use super::run::{Counts, Runner};
-use super::{What, groom, instance, interpolate};
+use super::{What, curves, groom, instance, interpolate};
 use crate::Error;
 use crate::cache::LongStep;
 use crate::config::{StrandModel, Target};
@@ -22,7 +22,7 @@ const SAVING: f64 = 0.03;
 /// Strands that a warning names.
 const NAMED: usize = 8;
 
-/// How far a skin may be from its rest pose where the simulation starts, relative to its size.
+/// How far roots may be from their rest pose where the simulation starts, relative to the hair's size; a turn in radians squared.
 const AT_REST: f64 = 1e-6;
 
 /// Count of strands at rest: what the stage skips.
@@ -47,7 +47,10 @@ struct Source {
     /// Metres.
     position: Vec<[f64; 3]>,
     id: Vec<u64>,
+    /// On the rest skin; empty without one.
     root: Vec<SurfacePoint>,
+    /// Where the roots are at rest, scene units.
+    anchor: Vec<[f64; 3]>,
 }
 
 /// Positions of a simulated layer at a frame, scene units relative to the skin's origin.
@@ -180,7 +183,19 @@ fn size(bytes: u64) -> String {
 
 fn source(run: &mut Runner<'_>, i: usize) -> Result<Source, Error> {
     let unit = run.project.shot.value.shot.meters_per_unit;
+    if run.project.curves.is_some() {
+        let (hair, offsets) = (curves::hair(run)?, curves::offsets(run)?);
+        let rest = interpolate::positions(run, What::Rest(i))?;
+        return Ok(Source {
+            offsets,
+            position: rest.iter().map(|p| hair.scene(p).map(|x| x * unit)).collect(),
+            id: hair.id.clone(),
+            root: hair.root.clone(),
+            anchor: hair.anchors(),
+        });
+    }
     let skin = groom::skin(run)?;
+    let anchors = |root: &[SurfacePoint]| root.iter().map(|p| p.blend(skin.corners(p)).into()).collect();
     if run.project.target(i) == Target::EveryHair {
         let (roots, points) = (instance::roots(run, i)?, run.project.points(i));
         let rest = interpolate::positions(run, What::Rest(i))?;
@@ -191,6 +206,7 @@ fn source(run: &mut Runner<'_>, i: usize) -> Result<Source, Error> {
             position: rest.par_iter().map(metres).collect(),
             id: roots.id.clone(),
             root: roots.root.clone(),
+            anchor: anchors(&roots.root),
         });
     }
     let controls = groom::combed(run)?;
@@ -204,6 +220,7 @@ fn source(run: &mut Runner<'_>, i: usize) -> Result<Source, Error> {
         position: (0..controls.len()).flat_map(hair).collect(),
         id: (0..controls.len() as u64).collect(),
         root: controls.root.clone(),
+        anchor: anchors(&controls.root),
     })
 }
 
@@ -215,10 +232,10 @@ fn settings(run: &Runner<'_>, i: usize) -> Settings {
             StrandModel::Springs => Model::Springs,
             StrandModel::Paper => Model::Paper,
         },
-        material: run.project.groom.value.layer[i].material.si(),
-        segments: Some(run.project.segments()),
+        material: run.project.material(i).1.si(),
+        segments: if run.project.curves.is_some() { s.segments } else { Some(run.project.segments()) },
         substeps: s.substeps,
-        sag_free: s.sag_free.unwrap_or(true),
+        sag_free: run.project.sag_free(),
         strain_limit: s.strain_limit,
         friction: s.friction,
         offset: s.offset * 1e-3,
@@ -240,7 +257,10 @@ fn note_start(
     started: &Started,
     step: &mut LongStep,
 ) -> Result<(), Error> {
-    let hairs = instance::roots(run, i)?.id.len();
+    let hairs = match &run.project.curves {
+        Some(_) => running.source.id.len(),
+        None => instance::roots(run, i)?.id.len(),
+    };
     let layer = &run.project.groom.value.layer[i].name;
     let counts = step.counts();
     for (name, n) in [
@@ -270,12 +290,11 @@ fn list(ids: &[u64]) -> String {
 
 /// Where the roots are at a frame: in the world, or for a skin that moves as a whole, at rest.
 fn root_rides(run: &mut Runner<'_>, timeline: &Timeline<'_>, source: &Source, frame: i64) -> Result<Vec<Ride>, Error> {
-    let skin = groom::skin(run)?;
     let arrival = timeline.arrival();
     if timeline.rigid(arrival, 0.0).is_some() {
-        let on_skin = |p: &SurfacePoint| Ride::still(p.blend(skin.corners(p)).into());
-        return Ok(source.root.iter().map(on_skin).collect());
+        return Ok(source.anchor.iter().map(|a| Ride::still(*a)).collect());
     }
+    let skin = groom::skin(run)?;
     let read = |frame: i64| match timeline.skin_at(frame) {
         Some(SkinAt::File(file)) => Ok(ply::read_frame(&file.path, skin.mesh.position.len(), skin.faces())?),
         _ => Ok::<_, Error>(skin.mesh.position.clone()),
@@ -289,26 +308,33 @@ fn root_rides(run: &mut Runner<'_>, timeline: &Timeline<'_>, source: &Source, fr
         ease_positions(&skin.mesh.position, &target, &next, frames, s)
     };
     let pose = Pose::new(&skin.mesh, &skin.topology, position);
-    Ok(rides(&skin.mesh, &skin.topology, &skin.rest, &pose, &source.root))
+    Ok(rides(&skin.mesh, &skin.topology, &skin.rest, &pose, &source.root, &source.anchor))
 }
 
 /// Without pre-roll the simulation starts at the first frame: there the skin must be at rest.
 fn check_at_rest(run: &mut Runner<'_>, timeline: &Timeline<'_>, source: &Source) -> Result<(), Error> {
-    let skin = groom::skin(run)?;
-    let at_rest = rides(&skin.mesh, &skin.topology, &skin.rest, &skin.rest, &source.root);
     let mut now = root_rides(run, timeline, source, timeline.first)?;
     if let Some(t) = timeline.rigid(timeline.first, timeline.first as f64) {
-        now.iter_mut().for_each(|r| r.position = t.apply(Vec3::from(r.position)).into());
+        let place = |r: &mut Ride| *r = Ride { position: t.apply(Vec3::from(r.position)).into(), rotation: t.rotation };
+        now.iter_mut().for_each(place);
     }
-    let (low, high) = skin.mesh.bounds();
-    let tolerance = AT_REST * (Vec3::from(high) - Vec3::from(low)).norm();
-    let moved = |(a, b): (&Ride, &Ride)| (Vec3::from(a.position) - Vec3::from(b.position)).norm() > tolerance;
-    if at_rest.iter().zip(&now).any(moved) {
-        let what = format!("is 0, but the skin is not at its rest pose at frame {}", timeline.first);
+    let unit = run.project.shot.value.shot.meters_per_unit;
+    let (low, high) = bounds(&source.position);
+    let tolerance = AT_REST * (high - low).norm() / unit;
+    let moved = |(a, b): (&[f64; 3], &Ride)| {
+        (Vec3::from(*a) - Vec3::from(b.position)).norm() > tolerance || b.rotation[3].abs() < 1.0 - AT_REST
+    };
+    if source.anchor.iter().zip(&now).any(moved) {
+        let what = format!("is 0, but roots are not at their rest pose at frame {}", timeline.first);
         let help = "give it frames to come there from the rest pose: 12 is usual";
         return Err(run.project.shot.error("shot.preroll", what, help).into());
     }
     Ok(())
+}
+
+fn bounds(points: &[[f64; 3]]) -> (Vec3, Vec3) {
+    let start = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
+    points.iter().fold(start, |(low, high), p| (low.inf(&Vec3::from(*p)), high.sup(&Vec3::from(*p))))
 }
 
 /// Roots in metres, each turned the shorter way from where it was.
@@ -337,7 +363,7 @@ fn advance(
     let disk = || Error::disk(&cache);
     let (gravity, wind) = (shot.simulate.gravity.downward(shot.shot.up), shot.simulate.wind.as_ref());
     let (layer, arrival) = (&project.groom.value.layer[running.layer].name, timeline.arrival());
-    let origin = groom::skin(run)?.origin();
+    let origin = run.origin()?;
     let mut before = root_rides(run, timeline, &running.source, running.frame)?;
     let (mut saved, mut saving) = (Instant::now(), 0.0);
     while running.frame < end {
