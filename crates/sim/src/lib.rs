@@ -2,13 +2,23 @@
 //!
 //! SI units throughout: metres, seconds, kilograms. Positions are in the world, axes as in the scene.
 
+pub mod band;
 pub mod body;
+pub mod contact;
+pub mod drag;
+pub mod group;
+pub mod integrate;
+pub mod lanes;
+pub mod rod;
+pub mod settle;
 pub mod simulation;
+pub mod stage;
+pub mod springs;
 pub mod wind;
 
-pub use body::{Body, Motion, Part, Rigid, Shape};
+pub use body::{Body, Hit, Motion, Part, Rigid, Shape};
 pub use simulation::{
-    Hairs, Material, Model, Root, Settings, SimError, Simulation, Span, SpanReport, Started, StiffenedStrand,
+    End, Hairs, Material, Model, Root, Settings, SimError, Simulation, Span, SpanReport, Started, StiffenedStrand,
 };
 pub use wind::Wind;
 

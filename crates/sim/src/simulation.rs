@@ -1,7 +1,18 @@
 //! A layer of hair in motion: the constant model, the changing state, and the step over a span of time.
 
+use crate::contact::{self, Keep};
+use crate::drag;
+use crate::group::{Group, Strand};
+use crate::settle;
+use crate::integrate::{self, Around, Done, Interval, Method, Work};
+use crate::lanes::{LANES, Pack, Width};
+use crate::rod::{self, Damping};
+use crate::stage::{Air, Contact};
+use crate::wind::Surface;
 use crate::{Body, Motion, Rigid, Vec3, Wind};
 use pelage_geom::{Offsets, StrandId};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Hairs at the rest pose, root first.
 #[derive(Clone, Copy, Debug)]
@@ -65,6 +76,18 @@ pub enum Model {
     Paper,
 }
 
+/// How an end of a strand is held.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum End {
+    /// Not at all.
+    #[default]
+    Free,
+    /// Its point, free to turn.
+    Pinned,
+    /// Its point, its direction, and its turn about it.
+    Clamped,
+}
+
 /// How a layer is simulated; constant over a shot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
@@ -72,10 +95,20 @@ pub struct Settings {
     pub model: Model,
     /// What the hair is made of.
     pub material: Material,
+    /// How roots are held.
+    pub root: End,
+    /// How tips are held.
+    pub tip: End,
     /// Segments of a strand, equal in arc length; `None`: the input's points as they are.
     pub segments: Option<usize>,
     /// Steps in a span; `None`: chosen from the prescribed motion.
     pub substeps: Option<u32>,
+    /// A stage ends when no segment would turn by more than this in all later iterations, radians. Above 1e-4 what is
+    /// left over spoils the guess of the next step, and costs accuracy and time; below 1e-7 steps take one more iteration
+    /// for nothing that can be seen.
+    pub tolerance: f64,
+    /// A strand that turns farther than this in a step takes smaller ones, radians.
+    pub largest_turn: f64,
     /// Start in equilibrium under gravity.
     pub sag_free: bool,
     /// Largest strain that limiting leaves in a segment.
@@ -96,9 +129,13 @@ impl Default for Settings {
     fn default() -> Self {
         Settings {
             model: Model::Rod,
+            root: End::Clamped,
+            tip: End::Free,
             material: Material::default(),
             segments: None,
             substeps: None,
+            tolerance: 1e-5,
+            largest_turn: 0.2,
             sag_free: true,
             strain_limit: 0.01,
             friction: 0.3,
@@ -130,6 +167,8 @@ pub struct Span<'a> {
     pub motion: Motion<'a>,
     /// Roots at the beginning and at the end, one a hair; linear in between.
     pub roots: [&'a [Root]; 2],
+    /// Tips at the beginning and at the end, if tips are held.
+    pub tips: Option<[&'a [Root]; 2]>,
     /// What hair can't enter.
     pub body: &'a Body<'a>,
     /// Gravity at the beginning and at the end, metres per second squared.
@@ -181,8 +220,10 @@ pub struct SpanReport {
     pub subdivided: u64,
     /// Strands that slept.
     pub sleeping: u64,
-    /// Points touching the body at the end.
-    pub contacts: u64,
+    /// Points that the exact mesh pushed out at the end.
+    pub corrected: u64,
+    /// Depth of the deepest point that is on its way out of the body, metres.
+    pub deepest: f64,
     /// Strands carried over a jump of their root.
     pub teleported: u64,
     /// Strands that diverged and were held for this span.
@@ -220,12 +261,75 @@ pub enum SimError {
     Stopped,
 }
 
+/// A hair that is too short to move by itself: it rides with its root.
+#[derive(Clone, Debug, PartialEq)]
+struct Rider {
+    index: usize,
+    point: Vec<Vec3>,
+}
+
 /// A layer of hair in motion.
 #[derive(Clone, Debug)]
 pub struct Simulation {
+    settings: Settings,
     offsets: Offsets,
-    rest: Vec<[f64; 3]>,
-    now: Vec<[f64; 3]>,
+    id: Vec<StrandId>,
+    group: Vec<Group>,
+    rider: Vec<Rider>,
+    /// Node of its strand for every output point.
+    pick: Vec<u32>,
+    /// Group and lane of every strand; `None` for riders.
+    place: Vec<Option<(u32, u8)>>,
+    /// Where every root was at the end of the last span, in the world.
+    root: Vec<Rigid>,
+}
+
+/// Segments shorter than this have no direction, metres.
+const SHORTEST: f64 = 1e-9;
+
+/// Steps a second without motion of the body. Fewer and hair that swings freely takes steps of its own; more cost time.
+const STEPS_PER_SECOND: f64 = 192.0;
+
+/// Points between samples of the wind along a hair. One is exact and costs most of the step; the wind is smooth over many.
+const WIND_STRIDE: usize = 4;
+
+/// A strand that moves slower than this over two spans, with nothing around it moving, sleeps, metres per second. What it
+/// would still have moved is less than this times its longest period (about 1 s): a micrometre.
+const SLEEP_SPEED: f64 = 1e-6;
+
+/// Farthest that the skin turns in a step, radians.
+const STEP_TURN: f64 = 0.1;
+
+impl Settings {
+    /// Checks the ranges.
+    pub fn check(&self) -> Result<(), SimError> {
+        let m = &self.material;
+        let positive = |name, value: f64| {
+            let ok = value.is_finite() && value > 0.0;
+            if ok { Ok(()) } else { Err(SimError::Setting { name, value, expected: "a number above 0" }) }
+        };
+        let at_least_0 = |name, value: f64| {
+            let ok = value.is_finite() && value >= 0.0;
+            if ok { Ok(()) } else { Err(SimError::Setting { name, value, expected: "a number of at least 0" }) }
+        };
+        positive("diameter", m.diameter)?;
+        positive("young", m.young)?;
+        positive("density", m.density)?;
+        positive("bend_factor", m.bend_factor)?;
+        positive("twist_factor", m.twist_factor)?;
+        positive("stretch_factor", m.stretch_factor)?;
+        at_least_0("drag_factor", m.drag_factor)?;
+        at_least_0("damping", m.damping)?;
+        if !(m.poisson > -1.0 && m.poisson <= 0.5) {
+            return Err(SimError::Setting { name: "poisson", value: m.poisson, expected: "above -1 and at most 0.5" });
+        }
+        positive("tolerance", self.tolerance)?;
+        positive("largest_turn", self.largest_turn)?;
+        positive("strain_limit", self.strain_limit)?;
+        positive("teleport", self.teleport)?;
+        at_least_0("friction", self.friction)?;
+        at_least_0("offset", self.offset)
+    }
 }
 
 impl Simulation {
@@ -233,41 +337,144 @@ impl Simulation {
     ///
     /// The result depends on the arguments only.
     pub fn new(hairs: &Hairs<'_>, settings: &Settings, gravity: [f64; 3]) -> Result<(Self, Started), SimError> {
-        let _ = gravity;
-        let mut rest = Vec::new();
+        settings.check()?;
         let mut counts = Vec::new();
+        let (mut pick, mut strands, mut rider) = (Vec::new(), Vec::new(), Vec::new());
+        let mut root = Vec::new();
         for h in 0..hairs.offsets.len() {
             let points: Vec<Vec3> = hairs.position[hairs.offsets.range(h)].iter().map(|p| Vec3::from(*p)).collect();
-            let n = settings.segments.map_or(points.len(), |s| s + 1);
-            counts.push(n);
-            rest.extend(pelage_geom::curve::resample(&points, n).iter().map(|p| [p.x, p.y, p.z]));
+            if let Some(point) = points.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
+                return Err(SimError::NotFinite { hair: h, point });
+            }
+            let points = sample(points, settings.segments);
+            counts.push(points.len());
+            root.push(Rigid { translation: points[0].into(), ..Rigid::default() });
+            let mut own: Vec<Vec3> = Vec::with_capacity(points.len());
+            for p in &points {
+                if own.last().is_none_or(|q| (p - q).norm() > SHORTEST) {
+                    own.push(*p);
+                }
+                pick.push(own.len() as u32 - 1);
+            }
+            if own.len() < 2 {
+                rider.push(Rider { index: h, point: points });
+            } else {
+                strands.push(Strand { index: h, point: own });
+            }
         }
-        let started = Started { particles: rest.len() as u64, ..Started::default() };
-        Ok((Simulation { offsets: Offsets::from_counts(counts), now: rest.clone(), rest }, started))
+        // Strands of like length share a group, so that little is padded.
+        strands.sort_by_key(|s| s.point.len());
+        let prepare = |s: &[Strand]| settle::prepare(s, settings, gravity);
+        let (group, figures): (Vec<Group>, Vec<_>) = strands.par_chunks(LANES).map(prepare).unzip();
+        let mut place = vec![None; hairs.offsets.len()];
+        for (i, g) in group.iter().enumerate() {
+            for (l, s) in g.strand.iter().enumerate() {
+                if let Some(s) = s {
+                    place[*s] = Some((i as u32, l as u8));
+                }
+            }
+        }
+        let nodes: usize = group.iter().map(|g| g.node.len()).sum();
+        let started = Started {
+            particles: pick.len() as u64,
+            bytes: (nodes * (size_of::<crate::stage::Node>() + size_of::<crate::stage::Motion>())) as u64
+                + (nodes * size_of::<rod::Elastic>()) as u64,
+            stiffened: figures.iter().flat_map(|f| &f.stiffened).map(|&(s, factor)| StiffenedStrand { id: hairs.id[s], factor }).collect(),
+            rigid: rider.iter().map(|r| hairs.id[r.index]).collect(),
+            largest_hinge: figures.iter().map(|f| f.hinge).fold(0.0, f64::max),
+            largest_gamma: figures.iter().map(|f| f.gamma).fold(0.0, f64::max),
+        };
+        let offsets = Offsets::from_counts(counts);
+        let id = hairs.id.to_vec();
+        Ok((Simulation { settings: settings.clone(), offsets, id, group, rider, pick, place, root }, started))
     }
 
     /// Estimates the memory that [`Simulation::new`] will need, bytes, before any of it is taken.
     pub fn memory(hairs: usize, points: usize) -> u64 {
-        (hairs * points * 200) as u64
+        let node = size_of::<crate::stage::Node>() + size_of::<crate::stage::Motion>() + size_of::<rod::Elastic>();
+        // Ghost nodes, input and output points.
+        (hairs.div_ceil(LANES) * (points + 1) * node + hairs * points * 28) as u64
     }
 
     /// Moves through a span. `progress` is told the fraction done and may stop the work by returning false; then the
-    /// state is as it was before the call.
+    /// state is of no use until [`Simulation::restore`].
     pub fn advance(
         &mut self,
         span: &Span<'_>,
         progress: &(dyn Fn(f64) -> bool + Sync),
     ) -> Result<SpanReport, SimError> {
-        let end: Rigid = (span.motion)(1.0);
-        for (s, root) in span.roots[1].iter().enumerate() {
-            let turn = Rigid { rotation: root.rotation, translation: root.position };
-            let run = self.offsets.range(s);
-            let first = Vec3::from(self.rest[run.start]);
-            for i in run {
-                self.now[i] = end.apply(turn.apply(Vec3::from(self.rest[i]) - first)).into();
+        let (turn, steps) = self.steps(span);
+        let _ = turn;
+        let width = if self.settings.wide { Width::best() } else { Width::Plain };
+        let method = Method {
+            width,
+            tolerance: self.settings.tolerance,
+            friction: self.settings.friction,
+            damping: Damping(self.settings.material.damping),
+            twist: true,
+            largest_turn: self.settings.largest_turn,
+            strain_limit: self.settings.strain_limit,
+        };
+        let count = self.group.len();
+        let (finished, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
+        let scene = Scene { span, settings: &self.settings, last: &self.root, calm: is_calm(span) };
+        let done: Vec<Moved> = self
+            .group
+            .par_iter_mut()
+            .map_init(Work::default, |work, g| {
+                let mut done = Moved::default();
+                if !stopped.load(Ordering::Relaxed) {
+                    move_group(g, &scene, &method, steps, work, &mut done);
+                    let k = finished.fetch_add(1, Ordering::Relaxed) + 1;
+                    if !progress(k as f64 / count as f64) {
+                        stopped.store(true, Ordering::Relaxed);
+                    }
+                }
+                done
+            })
+            .collect();
+        if stopped.load(Ordering::Relaxed) || (count == 0 && !progress(1.0)) {
+            return Err(SimError::Stopped);
+        }
+        let mut report = SpanReport { steps, shortest_step: span.seconds / f64::from(steps), ..SpanReport::default() };
+        for (g, d) in self.group.iter().zip(&done) {
+            report.corrected += d.corrected;
+            report.deepest = report.deepest.max(d.deepest);
+            report.teleported += count_true(d.teleported);
+            report.sleeping += count_true(d.asleep);
+            let d = &d.done;
+            report.particle_steps += d.node_steps;
+            report.particle_solves += d.node_solves;
+            for l in 0..LANES {
+                let Some(s) = g.strand[l] else { continue };
+                report.largest_strain = report.largest_strain.max(d.strain[l]);
+                report.subdivided += u64::from(d.deepest[l] > 0);
+                let short = span.seconds / f64::from(steps) / f64::from(1u32 << d.deepest[l]);
+                report.shortest_step = report.shortest_step.min(short);
+                if d.failed[l] {
+                    report.held.push(self.id[s]);
+                }
             }
         }
-        if progress(1.0) { Ok(SpanReport::default()) } else { Err(SimError::Stopped) }
+        report.held.sort_unstable();
+        let last = scene.all_roots();
+        for (s, root) in last.iter().enumerate() {
+            match root {
+                Some(r) => self.root[s] = *r,
+                None => report.bad_roots.push(self.id[s]),
+            }
+        }
+        Ok(report)
+    }
+
+    /// Steps of a span, from what is prescribed only; and the skin's turn.
+    fn steps(&self, span: &Span<'_>) -> (f64, u32) {
+        let samples = 8;
+        let pose = |k: i32| (span.motion)(f64::from(k) / f64::from(samples));
+        let turn: f64 = (0..samples).map(|k| pose(k).quaternion().angle_to(&pose(k + 1).quaternion())).sum();
+        let least = (span.seconds * STEPS_PER_SECOND).max(turn / STEP_TURN);
+        let automatic = if least.is_finite() { (least - 1e-6).ceil().clamp(1.0, 4096.0) as u32 } else { 1 };
+        (turn, self.settings.substeps.unwrap_or(automatic).max(1))
     }
 
     /// Runs of [`Simulation::positions`], one a hair, in the order of the input.
@@ -277,21 +484,321 @@ impl Simulation {
 
     /// Points of every hair, root first, metres.
     pub fn positions(&self) -> Vec<[f64; 3]> {
-        self.now.clone()
+        let mut out = vec![[0.0; 3]; self.offsets.total()];
+        for (s, place) in self.place.iter().enumerate() {
+            if let Some((g, l)) = place {
+                let g = &self.group[*g as usize];
+                for i in self.offsets.range(s) {
+                    out[i] = g.x(g.before + self.pick[i] as usize, *l as usize).into();
+                }
+            }
+        }
+        for r in &self.rider {
+            for (p, i) in r.point.iter().zip(self.offsets.range(r.index)) {
+                out[i] = self.root[r.index].apply(p - r.point[0]).into();
+            }
+        }
+        out
+    }
+
+    /// Velocities of the points of every hair, metres per second; 0 for hairs that ride with their roots.
+    pub fn velocities(&self) -> Vec<[f64; 3]> {
+        let mut out = vec![[0.0; 3]; self.offsets.total()];
+        for (s, place) in self.place.iter().enumerate() {
+            if let Some((g, l)) = place {
+                let g = &self.group[*g as usize];
+                for i in self.offsets.range(s) {
+                    out[i] = g.v(g.before + self.pick[i] as usize, *l as usize).into();
+                }
+            }
+        }
+        out
     }
 
     /// The whole changing state as bytes: [`Simulation::restore`] on a simulation made from the same input goes on as
-    /// if nothing had happened.
+    /// if nothing had happened. Strand by strand, so that it does not depend on how strands are packed.
     pub fn save(&self) -> Vec<u8> {
-        bytemuck::cast_slice(&self.now).to_vec()
+        let mut out: Vec<f64> = Vec::new();
+        for (s, place) in self.place.iter().enumerate() {
+            let r = &self.root[s];
+            out.extend(r.rotation.iter().chain(&r.translation));
+            if let Some((g, l)) = place {
+                let (g, l) = (&self.group[*g as usize], *l as usize);
+                out.extend([f64::from(g.level[l]), f64::from(g.quiet[l])]);
+                for (i, m) in g.motion[..g.count[l]].iter().enumerate() {
+                    out.extend([&m.x, &m.v, &m.a, &m.m].into_iter().flatten().map(|p| p.0[l]));
+                    // Not a number before the first span.
+                    let keep = |p: &[Pack]| p.get(i).map_or(f64::NAN, |p| p.0[l]);
+                    out.extend([keep(&g.keep.most), keep(&g.keep.now)]);
+                }
+            }
+        }
+        bytemuck::cast_slice(&out).to_vec()
     }
 
     /// Takes over a saved state.
     pub fn restore(&mut self, state: &[u8]) -> Result<(), SimError> {
-        if state.len() != self.now.len() * 24 {
+        let values: Vec<f64> = state.chunks_exact(8).map(bytemuck::pod_read_unaligned).collect();
+        let size = |p: &Option<(u32, u8)>| {
+            7 + p.map_or(0, |(g, l)| 2 + 14 * self.group[g as usize].count[l as usize])
+        };
+        if state.len() != 8 * self.place.iter().map(size).sum::<usize>() {
             return Err(SimError::State("its length differs"));
         }
-        self.now = state.chunks_exact(24).map(bytemuck::pod_read_unaligned).collect();
+        let mut values = values.into_iter();
+        let mut next = || values.next().expect("the length was checked");
+        for (s, place) in self.place.iter().enumerate() {
+            let r = &mut self.root[s];
+            r.rotation = std::array::from_fn(|_| next());
+            r.translation = std::array::from_fn(|_| next());
+            if let Some((g, l)) = place {
+                let (g, l) = (&mut self.group[*g as usize], *l as usize);
+                g.level[l] = next() as u8;
+                g.quiet[l] = next() as u32;
+                for i in 0..g.count[l] {
+                    let m = &mut g.motion[i];
+                    for p in [&mut m.x, &mut m.v, &mut m.a, &mut m.m].into_iter().flatten() {
+                        p.0[l] = next();
+                    }
+                    let (most, now) = (next(), next());
+                    if most.is_nan() {
+                        g.keep = Keep::default();
+                    } else {
+                        let n = g.node.len();
+                        for (keep, value) in [(&mut g.keep.most, most), (&mut g.keep.now, now)] {
+                            keep.resize(n, Pack::default());
+                            keep[i].0[l] = value;
+                        }
+                    }
+                }
+            }
+        }
         Ok(())
+    }
+}
+
+/// The points of a hair as they are, or `segments` equal chords of the same length as the hair.
+fn sample(points: Vec<Vec3>, segments: Option<usize>) -> Vec<Vec3> {
+    let Some(segments) = segments else { return points };
+    let length = |p: &[Vec3]| p.windows(2).map(|w| (w[1] - w[0]).norm()).sum::<f64>();
+    let mut new = pelage_geom::curve::resample(&points, segments + 1);
+    // Chords cut corners; the hair keeps its length.
+    let scale = length(&points) / length(&new);
+    if scale.is_finite() {
+        let root = new[0];
+        for p in &mut new {
+            *p = root + (*p - root) * scale;
+        }
+    }
+    new
+}
+
+/// Moves a group through a span.
+fn move_group(g: &mut Group, scene: &Scene<'_>, method: &Method, steps: u32, work: &mut Work, done: &mut Moved) {
+    let saved = g.motion.clone();
+    if g.keep.most.is_empty() {
+        g.keep = Keep::new(g, &scene.span.body.at(0.0), scene.settings.offset);
+    }
+    let mut lanes = [false; LANES];
+    for l in 0..LANES {
+        let Some(s) = g.strand[l] else { continue };
+        let (from, to) = (scene.root(s, 0.0), scene.root(s, 1.0));
+        let jump = (Vec3::from(to.translation) - Vec3::from(from.translation)).norm();
+        if jump > scene.settings.teleport {
+            done.teleported[l] = true;
+            g.carry(l, &from, &to);
+        } else if scene.calm && scene.settings.sleep && g.quiet[l] >= 2 && from == to {
+            done.asleep[l] = true;
+        } else {
+            lanes[l] = true;
+        }
+    }
+    for k in 0..steps {
+        let length = 1.0 / f64::from(steps);
+        let at = Interval { start: f64::from(k) * length, length, span: scene.span.seconds };
+        integrate::advance(g, scene, method, at, lanes, 0, work, &mut done.done);
+        if scene.solid() {
+            g.keep.release(length * scene.span.seconds);
+        }
+    }
+    for l in 0..LANES {
+        let Some(s) = g.strand[l] else { continue };
+        if done.done.failed[l] {
+            // Held: it rides with its root for this span, and starts again from rest.
+            g.revert(l, &saved);
+            g.carry(l, &scene.root(s, 0.0), &scene.root(s, 1.0));
+            g.stop(l);
+        }
+        if lanes[l] {
+            let still = scene.calm && done.done.speed[l] < SLEEP_SPEED;
+            g.quiet[l] = if still { g.quiet[l] + 1 } else { 0 };
+            if g.quiet[l] >= 2 && scene.settings.sleep {
+                g.stop(l);
+            }
+        }
+    }
+    if scene.solid() && lanes.contains(&true) {
+        (done.corrected, done.deepest) = contact::correct(g, &scene.span.body.at(1.0));
+    }
+}
+
+/// What a group did in a span.
+#[derive(Clone, Copy, Debug, Default)]
+struct Moved {
+    done: Done,
+    teleported: [bool; LANES],
+    asleep: [bool; LANES],
+    corrected: u64,
+    deepest: f64,
+}
+
+/// A span as the integrator sees it.
+struct Scene<'a> {
+    span: &'a Span<'a>,
+    settings: &'a Settings,
+    last: &'a [Rigid],
+    /// Nothing around the hair moves in this span: neither skin, nor body, gravity, or wind.
+    calm: bool,
+}
+
+fn count_true(lanes: [bool; LANES]) -> u64 {
+    lanes.iter().filter(|&&b| b).count() as u64
+}
+
+/// Whether nothing around the hair moves in a span.
+fn is_calm(span: &Span<'_>) -> bool {
+    let rests = |m: Motion<'_>| m(0.0) == m(0.5) && m(0.0) == m(1.0);
+    let part = |p: &crate::Part<'_>| rests(p.motion) && !matches!(p.shape, crate::Shape::Deforming(_));
+    let [a, b] = span.gravity;
+    span.wind.is_none() && a == b && rests(span.motion) && span.body.parts.iter().all(part)
+}
+
+fn is_finite(r: &Root) -> bool {
+    r.position.iter().chain(&r.rotation).all(|x| x.is_finite())
+}
+
+impl Scene<'_> {
+    /// A root or tip in the world at a fraction of the span.
+    fn placement(&self, ends: [&[Root]; 2], s: usize, fraction: f64) -> Rigid {
+        let [a, b] = [&ends[0][s], &ends[1][s]];
+        let f = fraction;
+        let dot: f64 = (0..4).map(|i| a.rotation[i] * b.rotation[i]).sum();
+        let sign = if dot < 0.0 { -1.0 } else { 1.0 };
+        let q: [f64; 4] = std::array::from_fn(|i| (1.0 - f) * a.rotation[i] + sign * f * b.rotation[i]);
+        let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let local = Rigid {
+            rotation: q.map(|x| x / norm),
+            translation: std::array::from_fn(|i| (1.0 - f) * a.position[i] + f * b.position[i]),
+        };
+        let world = (self.span.motion)(fraction);
+        let turn = world.quaternion() * local.quaternion();
+        let [x, y, z, w] = [turn.i, turn.j, turn.k, turn.w];
+        Rigid { rotation: [x, y, z, w], translation: world.apply(Vec3::from(local.translation)).into() }
+    }
+
+    /// A root in the world; where it was last if it is not a number.
+    fn root(&self, s: usize, fraction: f64) -> Rigid {
+        let [a, b] = self.span.roots.map(|r| is_finite(&r[s]));
+        if a && b { self.placement(self.span.roots, s, fraction) } else { self.last[s] }
+    }
+
+    /// Every root at the end of the span; `None` where it is not a number.
+    fn all_roots(&self) -> Vec<Option<Rigid>> {
+        let one = |s: usize| {
+            let good = is_finite(&self.span.roots[1][s]);
+            good.then(|| self.placement([self.span.roots[1]; 2], s, 1.0))
+        };
+        (0..self.last.len()).map(one).collect()
+    }
+}
+
+/// Places an end and its ghost.
+fn hold_end(g: &mut Group, lane: usize, tip: bool, end: End, at: &Rigid) {
+    if end == End::Free {
+        return;
+    }
+    let clamp = g.clamp[lane][usize::from(tip)];
+    let point = if tip { g.count[lane] - 1 - usize::from(end == End::Clamped) } else { g.before };
+    let set = |to: &mut [Pack; 3], v: Vec3| {
+        for c in 0..3 {
+            to[c].0[lane] = v[c];
+        }
+    };
+    set(&mut g.motion[point].x, Vec3::from(at.translation));
+    if end == End::Clamped {
+        let (ghost, edge) = if tip { (point + 1, point) } else { (0, 0) };
+        set(&mut g.motion[ghost].x, at.apply(Vec3::from(clamp.ghost)));
+        set(&mut g.motion[edge].m, at.quaternion() * Vec3::from(clamp.frame));
+    }
+}
+
+impl Around for Scene<'_> {
+    fn hold(&self, g: &mut Group, lanes: [bool; LANES], fraction: f64) {
+        for l in 0..LANES {
+            let (true, Some(s)) = (lanes[l], g.strand[l]) else { continue };
+            hold_end(g, l, false, self.settings.root, &self.root(s, fraction));
+            if let Some(tips) = self.span.tips {
+                hold_end(g, l, true, self.settings.tip, &self.placement(tips, s, fraction));
+            }
+        }
+    }
+
+    fn gravity(&self, fraction: f64) -> [f64; 3] {
+        let [a, b] = self.span.gravity;
+        std::array::from_fn(|c| (1.0 - fraction) * a[c] + fraction * b[c])
+    }
+
+    fn solid(&self) -> bool {
+        !self.span.body.parts.is_empty()
+    }
+
+    fn touch(&self, g: &Group, lanes: [bool; LANES], fraction: f64, h: f64, contact: &mut [Contact]) -> bool {
+        contact::find(g, &self.span.body.at(fraction), lanes, h, contact)
+    }
+
+    fn air(&self, g: &Group, lanes: [bool; LANES], fraction: f64, air: &mut [Air]) -> bool {
+        let factor = self.settings.material.drag_factor;
+        if factor == 0.0 {
+            return false;
+        }
+        let time = self.span.time + fraction * self.span.seconds;
+        let still = drag::Air::default();
+        let mut point: Vec<Vec3> = Vec::new();
+        let mut blowing = vec![Vec3::zeros(); g.node.len()];
+        for l in (0..LANES).filter(|&l| lanes[l] && g.strand[l].is_some()) {
+            let n = g.count[l];
+            if let Some(wind) = self.span.wind {
+                point.clear();
+                point.extend((0..n).map(|i| g.x(i, l)));
+                wind.free_along(&point, WIND_STRIDE, time, &mut blowing[..n]);
+                if wind.boundary > 0.0 && self.solid() {
+                    let body = self.span.body.at(fraction);
+                    for (i, p) in point.iter().enumerate() {
+                        if body.distance_bound(*p) < wind.boundary {
+                            let hit = body.sample(*p);
+                            let surface =
+                                Surface { distance: hit.distance, normal: hit.normal, velocity: hit.velocity };
+                            blowing[i] = crate::wind::beside(blowing[i], &surface, wind.boundary);
+                        }
+                    }
+                }
+            }
+            let length: f64 = (0..n).map(|i| g.node[i].share.0[l]).sum();
+            for i in 0..n {
+                let share = g.node[i].share.0[l];
+                let e = g.x((i + 1).min(n - 1), l) - g.x(i.saturating_sub(1), l);
+                let t = e.try_normalize(SHORTEST).unwrap_or(Vec3::zeros());
+                let u = g.v(i, l) - blowing[i];
+                let along = t.dot(&u);
+                let across = (u - t * along).norm();
+                let d = drag::drag(&still, self.settings.material.diameter, length, across, along.abs());
+                for c in 0..3 {
+                    air[i].velocity[c].0[l] = blowing[i][c];
+                }
+                air[i].across.0[l] = d.across * share * factor;
+                air[i].along.0[l] = d.along * share * factor;
+            }
+        }
+        true
     }
 }

@@ -1,0 +1,165 @@
+//! Hair against the body: planes that nodes may not cross, found anew for every stage.
+//!
+//! The response (Bridson et al. 2003 in the paper's section 5.1: relative normal velocities are constrained, friction
+//! opposes sliding) is part of the implicit stage, see [`crate::stage::Contact`]; here is where contacts are found, how
+//! contact ends without a bounce, and how points that are inside anyway come out without a gain of energy.
+
+use crate::Vec3;
+use crate::body::Instant;
+use crate::group::Group;
+use crate::lanes::{LANES, Pack};
+use crate::stage::Contact;
+
+/// Stiffness of contact over a node's inertia m / h^2: the share of a step's approach that is left as depth is one over
+/// this. Below 100, fast approaches end 0.1 mm deep; above 1e6 the matrix loses digits to it.
+const STIFFNESS: f64 = 2e3;
+
+/// Points that are inside come out no faster than this, metres per second. Faster, and hair born inside jumps; slower,
+/// and it stays there for seconds.
+const WAY_OUT: f64 = 0.2;
+
+/// Planes are set up for points closer than this, beyond what they may travel in the stage, metres.
+const NEAR: f64 = 2e-3;
+
+/// Depth at which the exact mesh pushes a point out, metres. Much less than 0.1 mm, which is what may be seen; more than
+/// what contact leaves.
+const VISIBLE: f64 = 2e-5;
+
+/// How close points of a group may come to the body.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Keep {
+    /// What each node keeps in the end, metres: the layer's offset, or less where it was groomed closer.
+    pub most: Vec<Pack>,
+    /// What it keeps now: less while it comes out from inside.
+    pub now: Vec<Pack>,
+}
+
+impl Keep {
+    /// Distances that nodes keep from now on, from where they are at the beginning.
+    pub fn new(g: &Group, body: &Instant<'_, '_>, offset: f64) -> Self {
+        let mut keep = Keep { most: vec![Pack::splat(offset); g.node.len()], now: Vec::new() };
+        keep.now = keep.most.clone();
+        for i in 0..g.node.len() {
+            for l in 0..LANES {
+                if is_free(g, i, l) {
+                    let p = g.x(i, l);
+                    if body.distance_bound(p) < offset {
+                        let d = body.sample(p).distance;
+                        keep.most[i].0[l] = d.clamp(0.0, offset);
+                        keep.now[i].0[l] = d.min(offset);
+                    }
+                }
+            }
+        }
+        keep
+    }
+
+    /// Lets points that are inside come out a little.
+    pub fn release(&mut self, seconds: f64) {
+        for (now, most) in self.now.iter_mut().zip(&self.most) {
+            for l in 0..LANES {
+                now.0[l] = (now.0[l] + WAY_OUT * seconds).min(most.0[l]);
+            }
+        }
+    }
+}
+
+fn is_free(g: &Group, i: usize, l: usize) -> bool {
+    g.strand[l].is_some() && g.node[i].held.0[l] == 0.0
+}
+
+/// Finds the contacts of some lanes at the nodes' present positions; false if there are none.
+pub fn find(
+    g: &Group,
+    body: &Instant<'_, '_>,
+    lanes: [bool; LANES],
+    h: f64,
+    contact: &mut [Contact],
+) -> bool {
+    let mut any = false;
+    for i in 0..g.node.len() {
+        for l in 0..LANES {
+            let c = &mut contact[i];
+            c.stiffness.0[l] = 0.0;
+            if !lanes[l] || !is_free(g, i, l) {
+                continue;
+            }
+            let p = g.x(i, l);
+            let travel = g.v(i, l).norm() * h;
+            let reach = g.keep.now[i].0[l].max(0.0) + NEAR + 0.5 * travel;
+            if body.distance_bound(p) > reach {
+                c.force.0[l] = 0.0;
+                continue;
+            }
+            let hit = body.sample(p);
+            if !(hit.distance < reach) {
+                c.force.0[l] = 0.0;
+                continue;
+            }
+            any = true;
+            let level = hit.normal.dot(&p) - hit.distance + g.keep.now[i].0[l];
+            for k in 0..3 {
+                c.normal[k].0[l] = hit.normal[k];
+                c.velocity[k].0[l] = hit.velocity[k];
+            }
+            c.level.0[l] = level;
+            c.stiffness.0[l] = STIFFNESS * g.node[i].mass.0[l] / (h * h);
+        }
+    }
+    any
+}
+
+/// After a step: no bounce (the relative normal velocity of touching points is 0, not outward), and points that are
+/// still inside may stay there for now.
+pub fn settle(g: &mut Group, contact: &[Contact], lanes: [bool; LANES]) {
+    for i in 0..g.node.len() {
+        for l in 0..LANES {
+            let c = &contact[i];
+            if !lanes[l] || c.stiffness.0[l] == 0.0 || c.force.0[l] == 0.0 {
+                continue;
+            }
+            let n = Vec3::new(c.normal[0].0[l], c.normal[1].0[l], c.normal[2].0[l]);
+            let surface = Vec3::new(c.velocity[0].0[l], c.velocity[1].0[l], c.velocity[2].0[l]);
+            let depth = c.level.0[l] - n.dot(&g.x(i, l));
+            if depth > 0.0 {
+                g.keep.now[i].0[l] -= depth;
+            }
+            let away = n.dot(&(g.v(i, l) - surface));
+            if away > 0.0 {
+                for k in 0..3 {
+                    g.motion[i].v[k].0[l] -= away * n[k];
+                    g.motion[i].a[k].0[l] = 0.0;
+                }
+            }
+        }
+    }
+}
+
+/// At the end of a span: points that the exact mesh has inside come out to its surface, but not those that are on their
+/// way out. Returns how many were moved, and how deep the deepest was that stays.
+pub fn correct(g: &mut Group, body: &Instant<'_, '_>) -> (u64, f64) {
+    let (mut moved, mut deepest) = (0, 0.0f64);
+    for i in 0..g.node.len() {
+        for l in 0..LANES {
+            if !is_free(g, i, l) {
+                continue;
+            }
+            let p = g.x(i, l);
+            let Some(hit) = body.exact(p, 0.0) else { continue };
+            if g.keep.now[i].0[l] < -VISIBLE {
+                deepest = deepest.max(-hit.distance);
+                continue;
+            }
+            if hit.distance < -VISIBLE {
+                moved += 1;
+                let to = p - hit.normal * hit.distance;
+                let inward = hit.normal.dot(&(g.v(i, l) - hit.velocity)).min(0.0);
+                for k in 0..3 {
+                    g.motion[i].x[k].0[l] = to[k];
+                    g.motion[i].v[k].0[l] -= inward * hit.normal[k];
+                }
+            }
+        }
+    }
+    (moved, deepest)
+}

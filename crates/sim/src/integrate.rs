@@ -1,0 +1,444 @@
+//! The step in time.
+//!
+//! SDIRK2 (R. Alexander, "Diagonally implicit Runge-Kutta methods for stiff ODE's", 1977): two implicit stages of length
+//! `gamma dt`, gamma = 1 - 1/sqrt 2. It is of second order, damps what it can't resolve (L-stable), needs no history, so
+//! that a strand may change its step at any time, and both stages are the minimisation of [`crate::stage`].
+//!
+//! A strand whose stage does not converge, or that turns too far in a step, takes that step in two halves, and so on; it
+//! alone, so no hair changes another.
+
+use crate::band::HELD;
+use crate::contact;
+use crate::group::{Group, mask};
+use crate::lanes::{self, Kernel, L3, LANES, Lanes, Pack, Width, load3, mul_add3, scale3, store3, sub3};
+use crate::rod::{self, Damping, Scratch, Watch};
+use crate::stage::{Air, Contact, Motion, Stage};
+
+/// The fraction of a step that each stage spans: 1 - 1 / sqrt 2.
+const GAMMA: f64 = 0.292_893_218_813_452_5;
+
+/// Most halvings of a step. Each doubles the work of that strand only.
+pub const DEEPEST: u8 = 6;
+
+/// Iterations of a stage before its step is halved.
+const ITERATIONS: usize = 8;
+
+/// What is left of an iteration's turn when contact comes and goes, radians. Above 0.05, hair that is pressed on a corner
+/// shows it; below 1e-3, strands halve their steps for nothing.
+const CONTACT_TOLERANCE: f64 = 1e-2;
+
+/// Iterations in which friction follows. With one, hair sticks and slips a stage late; with many, some never settle.
+const FRICTION_ITERATIONS: usize = 2;
+
+/// The first iteration counts as well converged if it turns less than this times the tolerance's root, radians: what the
+/// guess from the last acceleration leaves. Larger, errors of fast motion stay; smaller, calm hair iterates twice.
+const FIRST_TURN: f64 = 0.05;
+
+/// Slowest convergence that is believed.
+const SLOWEST: f64 = 0.9;
+
+/// Buffers of a thread.
+#[derive(Debug, Default)]
+pub struct Work {
+    saved: Vec<Vec<Motion>>,
+    y: Vec<[Pack; 3]>,
+    base: Vec<[Pack; 3]>,
+    /// Velocity that a stage starts from.
+    from: Vec<[Pack; 3]>,
+    turned: Vec<Pack>,
+    contact: Vec<Contact>,
+    air: Vec<Air>,
+    twisting: Scratch<4, 11>,
+    straight: Scratch<3, 9>,
+}
+
+/// How steps are taken.
+#[derive(Clone, Copy, Debug)]
+pub struct Method {
+    /// Widest registers to use.
+    pub width: Width,
+    /// An iteration ends when no edge turned by more than this in it, radians.
+    pub tolerance: f64,
+    /// Friction with the body.
+    pub friction: f64,
+    /// Internal damping.
+    pub damping: Damping,
+    /// Whether twist can act.
+    pub twist: bool,
+    /// A strand that turns farther than this in a step takes smaller ones, radians.
+    pub largest_turn: f64,
+    /// Largest strain.
+    pub strain_limit: f64,
+}
+
+/// What happens around a group while it moves.
+pub trait Around {
+    /// Places the held nodes of some lanes at a fraction of the span.
+    fn hold(&self, group: &mut Group, lanes: [bool; LANES], fraction: f64);
+    /// Gravity at a fraction of the span, metres per second squared.
+    fn gravity(&self, fraction: f64) -> [f64; 3];
+    /// Whether there is a body.
+    fn solid(&self) -> bool;
+    /// Fills in contacts at the nodes' present positions; false if there are none.
+    fn touch(&self, group: &Group, lanes: [bool; LANES], fraction: f64, h: f64, contact: &mut [Contact]) -> bool;
+    /// Fills in the air at the nodes of some lanes; false if it does not act.
+    fn air(&self, group: &Group, lanes: [bool; LANES], fraction: f64, air: &mut [Air]) -> bool;
+}
+
+/// What a group did.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Done {
+    /// Steps times nodes.
+    pub node_steps: u64,
+    /// Linear solves times nodes.
+    pub node_solves: u64,
+    /// Depth of the deepest halving, per lane.
+    pub deepest: [u8; LANES],
+    /// Lanes that diverged.
+    pub failed: [bool; LANES],
+    /// Steps after which a strand's strain was limited.
+    pub limited: u64,
+    /// Largest strain at the end of a step, per lane.
+    pub strain: [f64; LANES],
+    /// Largest speed at the end, per lane.
+    pub speed: [f64; LANES],
+}
+
+/// Times of a step: its beginning and length as fractions of the span, and the span's length in seconds.
+#[derive(Clone, Copy, Debug)]
+pub struct Interval {
+    /// Fraction of the span at which the step begins.
+    pub start: f64,
+    /// Its length as a fraction of the span.
+    pub length: f64,
+    /// Length of the span, seconds.
+    pub span: f64,
+}
+
+/// Takes a step with some lanes; halves it for those that need it.
+pub fn advance<A: Around>(
+    g: &mut Group,
+    around: &A,
+    method: &Method,
+    at: Interval,
+    lanes: [bool; LANES],
+    depth: u8,
+    work: &mut Work,
+    done: &mut Done,
+) {
+    let wanted: [bool; LANES] = std::array::from_fn(|l| lanes[l] && !done.failed[l]);
+    let mut deeper: [bool; LANES] = std::array::from_fn(|l| wanted[l] && g.level[l] > depth);
+    let now: [bool; LANES] = std::array::from_fn(|l| wanted[l] && !deeper[l]);
+    if now.contains(&true) {
+        let saved = save(g, work, depth);
+        let converged = step(g, around, method, at, now, work, done);
+        let seen = look(g, method, &saved);
+        for l in 0..LANES {
+            let finite = seen.finite.0[l] == 0.0;
+            let calm = converged[l] && finite && seen.turn.0[l] <= method.largest_turn * method.largest_turn;
+            if now[l] && (calm || (depth == DEEPEST && finite)) {
+                done.deepest[l] = done.deepest[l].max(depth);
+                done.strain[l] = seen.strain.0[l];
+                if seen.strain.0[l] > method.strain_limit {
+                    limit_strain(g, l, method.strain_limit, at.length * at.span);
+                    done.strain[l] = method.strain_limit;
+                    done.limited += 1;
+                }
+                done.speed[l] = seen.speed.0[l].sqrt();
+                // Half the turn would have been fine with twice the step.
+                if depth > 0 && seen.turn.0[l] < 0.16 * method.largest_turn * method.largest_turn {
+                    g.level[l] = depth - 1;
+                }
+                continue;
+            }
+            g.revert(l, &saved);
+            if now[l] {
+                if depth == DEEPEST {
+                    done.failed[l] = true;
+                } else {
+                    g.level[l] = depth + 1;
+                    deeper[l] = true;
+                }
+            }
+        }
+        work.saved[depth as usize] = saved;
+    }
+    if deeper.contains(&true) {
+        let half = 0.5 * at.length;
+        for start in [at.start, at.start + half] {
+            advance(g, around, method, Interval { start, length: half, ..at }, deeper, depth + 1, work, done);
+        }
+    }
+}
+
+/// Strain limiting from root to tip (the springs paper's section 4.2): only the node farther from the root moves, along the
+/// edge, and its velocity with it.
+fn limit_strain(g: &mut Group, l: usize, limit: f64, dt: f64) {
+    for i in 0..g.count[l] - 1 {
+        if g.elastic[i].stretch.0[l] == 0.0 || g.node[i + 1].held.0[l] != 0.0 {
+            continue;
+        }
+        let rest = g.node[i].length.0[l];
+        let from = g.x(i, l);
+        let e = g.x(i + 1, l) - from;
+        let length = e.norm();
+        let wanted = length.clamp(rest * (1.0 - limit), rest * (1.0 + limit));
+        if wanted != length {
+            let by = e * ((wanted - length) / length);
+            for c in 0..3 {
+                g.motion[i + 1].x[c].0[l] += by[c];
+                g.motion[i + 1].v[c].0[l] += by[c] / dt;
+            }
+        }
+    }
+}
+
+/// A copy of the group's state, in the buffer for its depth.
+fn save(g: &Group, work: &mut Work, depth: u8) -> Vec<Motion> {
+    if work.saved.len() <= depth as usize {
+        work.saved.resize(depth as usize + 1, Vec::new());
+    }
+    let mut saved = std::mem::take(&mut work.saved[depth as usize]);
+    saved.clear();
+    saved.extend_from_slice(&g.motion);
+    saved
+}
+
+/// Both stages; returns the lanes that converged.
+fn step<A: Around>(
+    g: &mut Group,
+    around: &A,
+    method: &Method,
+    at: Interval,
+    lanes: [bool; LANES],
+    work: &mut Work,
+    done: &mut Done,
+) -> [bool; LANES] {
+    let n = g.node.len();
+    let dt = at.length * at.span;
+    for v in [&mut work.y, &mut work.base, &mut work.from] {
+        v.resize(n, Default::default());
+    }
+    work.turned.resize(n, Pack::default());
+    work.contact.resize(n, Contact::default());
+    work.air.resize(n, Air::default());
+    work.twisting.reserve(n);
+    work.straight.reserve(n);
+    let h = GAMMA * dt;
+    let (mut converged, mut touched) = (lanes, false);
+    let start = held_positions(g);
+    let blowing = around.air(g, lanes, at.start, &mut work.air);
+    for (second, fraction, since) in
+        [(false, at.start + GAMMA * at.length, h), (true, at.start + at.length, dt - h)]
+    {
+        let gravity = around.gravity(fraction);
+        let rest = dt - h;
+        let Work { y, base, from, .. } = work;
+        lanes::run(method.width, Predict { motion: &mut g.motion, y, base, from, h, rest, gravity, second });
+        around.hold(g, lanes, fraction);
+        prescribe(g, work, &start, h, (fraction - at.start) * at.span);
+        let touching = around.solid() && around.touch(g, lanes, fraction, h, &mut work.contact);
+        let acting = Acting { h, since, touching, blowing };
+        let stage_ok = solve(g, method, acting, lanes, work, done);
+        touched |= touching;
+        for l in 0..LANES {
+            converged[l] &= stage_ok[l];
+        }
+    }
+    let Work { base, from, .. } = work;
+    lanes::run(method.width, Finish { motion: &mut g.motion, base, from, h });
+    if touched {
+        contact::settle(g, &work.contact, lanes);
+    }
+    let count: usize = (0..LANES).filter(|&l| lanes[l]).map(|l| g.count[l]).sum();
+    done.node_steps += count as u64;
+    converged
+}
+
+/// Positions of held nodes, for their velocities.
+fn held_positions(g: &Group) -> Vec<[Pack; 3]> {
+    let last = g.node.len() - 1;
+    let ends = [0, 1.min(last), last.saturating_sub(1), last];
+    ends.iter().map(|&i| g.motion[i].x).collect()
+}
+
+/// Gives held nodes their prescribed velocity, and no inertia.
+fn prescribe(g: &Group, work: &mut Work, start: &[[Pack; 3]], h: f64, elapsed: f64) {
+    let last = g.node.len() - 1;
+    let ends = [0, 1.min(last), last.saturating_sub(1), last];
+    for i in 0..=last {
+        for l in 0..LANES {
+            if g.node[i].held.0[l] == HELD {
+                let from = ends.iter().position(|&e| e == i).map(|k| start[k]);
+                for c in 0..3 {
+                    let x = g.motion[i].x[c].0[l];
+                    let v = from.map_or(0.0, |f| (x - f[c].0[l]) / elapsed);
+                    work.y[i][c].0[l] = x;
+                    work.base[i][c].0[l] = x - h * v;
+                    work.from[i][c].0[l] = v;
+                }
+            }
+        }
+    }
+}
+
+/// What acts in a stage.
+#[derive(Clone, Copy)]
+struct Acting {
+    h: f64,
+    since: f64,
+    touching: bool,
+    blowing: bool,
+}
+
+/// Iterates a stage to its tolerance; returns the lanes that reached it.
+fn solve(
+    g: &mut Group,
+    method: &Method,
+    acting: Acting,
+    lanes: [bool; LANES],
+    work: &mut Work,
+    done: &mut Done,
+) -> [bool; LANES] {
+    let Acting { h, since, touching, blowing } = acting;
+    work.turned.fill(Pack::default());
+    let mut active = lanes;
+    let mut last = Pack::splat(FIRST_TURN);
+    for iteration in 0..ITERATIONS {
+        let stage = Stage {
+            h,
+            since,
+            y: &work.y,
+            base: &work.base,
+            contact: touching.then_some(&mut work.contact),
+            friction: method.friction,
+            refresh: iteration < FRICTION_ITERATIONS,
+            air: blowing.then_some(&work.air),
+            active: mask(active),
+        };
+        let largest = if method.twist {
+            let scratch = &mut work.twisting;
+            lanes::run(method.width, Iterate { g, turned: &mut work.turned, damping: method.damping, stage, scratch })
+        } else {
+            let scratch = &mut work.straight;
+            lanes::run(method.width, Iterate { g, turned: &mut work.turned, damping: method.damping, stage, scratch })
+        };
+        for l in 0..LANES {
+            if active[l] {
+                done.node_solves += g.count[l] as u64;
+                let turn = largest.0[l].sqrt();
+                let ratio = (turn / last.0[l]).min(SLOWEST);
+                // What later iterations would still turn, if each turned by the same fraction of the one before.
+                active[l] = turn * ratio > method.tolerance * (1.0 - ratio) || (touching && iteration == 0);
+                last.0[l] = turn;
+            }
+        }
+        if !active.contains(&true) {
+            break;
+        }
+    }
+    // Points that come and go at the body may swing around the tolerance: close is enough there.
+    std::array::from_fn(|l| !active[l] || (touching && last.0[l] < CONTACT_TOLERANCE))
+}
+
+/// One iteration of a rod.
+struct Iterate<'a, 'b, const D: usize, const ROWS: usize> {
+    g: &'a mut Group,
+    turned: &'a mut [Pack],
+    damping: Damping,
+    stage: Stage<'b>,
+    scratch: &'a mut Scratch<D, ROWS>,
+}
+
+impl<const D: usize, const ROWS: usize> Kernel for Iterate<'_, '_, D, ROWS> {
+    type Out = Pack;
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Pack {
+        let Iterate { g, turned, damping, mut stage, scratch } = self;
+        rod::solve::<L, D, ROWS>(&g.node, &g.elastic, &g.motion, turned, damping, &mut stage, scratch);
+        let largest = rod::apply::<L, D, ROWS>(&g.node, &mut g.motion, turned, &stage.active, scratch);
+        let mut out = Pack::default();
+        largest.store(&mut out);
+        out
+    }
+}
+
+/// Free flight and the first guess of a stage.
+struct Predict<'a> {
+    motion: &'a mut [Motion],
+    y: &'a mut [[Pack; 3]],
+    base: &'a mut [[Pack; 3]],
+    from: &'a mut [[Pack; 3]],
+    h: f64,
+    rest: f64,
+    gravity: [f64; 3],
+    second: bool,
+}
+
+impl Kernel for Predict<'_> {
+    type Out = ();
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let h = L::splat(self.h);
+        let inverse = L::splat(1.0 / self.h);
+        let rest = L::splat(self.rest);
+        let [x, y, z] = self.gravity;
+        let fall: L3<L> = [L::splat(x), L::splat(y), L::splat(z)];
+        for (i, m) in self.motion.iter_mut().enumerate() {
+            let x = load3::<L>(&m.x);
+            let (base, from, a) = if self.second {
+                let start = load3::<L>(&self.base[i]);
+                let before = load3::<L>(&self.from[i]);
+                let v = scale3(sub3(x, start), inverse);
+                let a = scale3(sub3(v, before), inverse);
+                (mul_add3(v, rest, start), mul_add3(a, rest, before), a)
+            } else {
+                (x, load3(&m.v), load3(&m.a))
+            };
+            store3(mul_add3(mul_add3(fall, h, from), h, base), &mut self.y[i]);
+            store3(mul_add3(mul_add3(a, h, from), h, base), &mut m.x);
+            store3(base, &mut self.base[i]);
+            store3(from, &mut self.from[i]);
+        }
+    }
+}
+
+/// Velocities and accelerations after the last stage.
+struct Finish<'a> {
+    motion: &'a mut [Motion],
+    base: &'a [[Pack; 3]],
+    from: &'a [[Pack; 3]],
+    h: f64,
+}
+
+impl Kernel for Finish<'_> {
+    type Out = ();
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let inverse = L::splat(1.0 / self.h);
+        for (i, m) in self.motion.iter_mut().enumerate() {
+            let v = scale3(sub3(load3::<L>(&m.x), load3(&self.base[i])), inverse);
+            store3(v, &mut m.v);
+            store3(scale3(sub3(v, load3(&self.from[i])), inverse), &mut m.a);
+        }
+    }
+}
+
+struct Look<'a> {
+    g: &'a Group,
+    before: &'a [Motion],
+}
+
+impl Kernel for Look<'_> {
+    type Out = Watch;
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Watch {
+        let mut out = Watch::default();
+        rod::watch::<L>(&self.g.node, &self.g.elastic, self.before, &self.g.motion, &mut out);
+        out
+    }
+}
+
+fn look(g: &Group, method: &Method, before: &[Motion]) -> Watch {
+    lanes::run(method.width, Look { g, before })
+}

@@ -1,0 +1,258 @@
+//! The start: natural shapes, equilibrium under gravity, and whether that equilibrium can stand.
+//!
+//! A groom is a pose under gravity. [`crate::rod::stand`] finds the natural shape that hangs into exactly that pose. An
+//! equilibrium need not be stable, though: soft long hair that sticks out stands like a pencil on its tip. So the true
+//! tangent is taken (by differences of the exact gradient, several nodes at a time that do not see each other), factored,
+//! and the signs of its pivots tell (Sylvester's law of inertia). A strand that can't stand is stiffened until it can.
+
+use crate::band::{self, Column, Panel, RING, Window};
+use crate::group::{Group, Section, Strand};
+use crate::lanes::{self, Kernel, LANES, Lanes, Pack, Width};
+use crate::rod::{self, Damping, Scratch};
+use crate::simulation::{End, Settings};
+use crate::stage::Stage;
+use crate::Vec3;
+
+/// Stiffness doubles at most this often: 64 times.
+const DOUBLINGS: u32 = 6;
+
+/// Step of the differences, in lengths of an edge and radians. Rounding shows below 1e-7, curvature above 1e-4.
+const DIFFERENCE: f64 = 1e-5;
+
+/// Nodes that see each other are at most two apart.
+const COLOURS: usize = 5;
+
+/// What was found of a group.
+#[derive(Clone, Debug, Default)]
+pub struct Figures {
+    /// Largest angle between neighbouring segments, radians.
+    pub hinge: f64,
+    /// Largest w L^3 / B.
+    pub gamma: f64,
+    /// Strands (by index in the layer) that were stiffened, and the factor; 0 if the largest was not enough.
+    pub stiffened: Vec<(usize, f64)>,
+}
+
+/// Packs a group, finds its natural shape, and lets it stand.
+pub fn prepare(strands: &[Strand], settings: &Settings, gravity: [f64; 3]) -> (Group, Figures) {
+    let mut group = Group::pack(strands, settings);
+    let section = Section::new(settings);
+    let g = Vec3::from(gravity).norm();
+    let mut figures = Figures::default();
+    for s in strands {
+        let length: f64 = s.point.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
+        figures.gamma = figures.gamma.max(section.mass * g * length.powi(3) / section.bend);
+        for w in s.point.windows(3) {
+            figures.hinge = figures.hinge.max(angle(w[1] - w[0], w[2] - w[1]));
+        }
+    }
+    let width = if settings.wide { Width::best() } else { Width::Plain };
+    let (weight, free) = weights(&group, gravity);
+    // Only a strand that is clamped at one end and free at the other is determinate.
+    let sag_free = settings.sag_free && settings.root == End::Clamped && settings.tip == End::Free;
+    let settle = |group: &mut Group| {
+        lanes::run(width, Settle { group, weight: &weight, free: &free, sag_free });
+    };
+    settle(&mut group);
+    if sag_free && g > 0.0 {
+        let mut factor = [1.0; LANES];
+        let mut wrong = unstable(&group, width);
+        for _ in 0..DOUBLINGS {
+            let lanes: Vec<usize> = (0..LANES).filter(|&l| group.strand[l].is_some() && wrong[l]).collect();
+            if lanes.is_empty() {
+                break;
+            }
+            for l in lanes {
+                factor[l] *= 2.0;
+                for e in &mut group.elastic {
+                    e.bend.0[l] *= 2.0;
+                    e.twist.0[l] *= 2.0;
+                }
+            }
+            settle(&mut group);
+            wrong = unstable(&group, width);
+        }
+        for l in 0..LANES {
+            if let Some(s) = group.strand[l].filter(|_| factor[l] > 1.0) {
+                figures.stiffened.push((s, if wrong[l] { 0.0 } else { factor[l] }));
+            }
+        }
+    }
+    (group, figures)
+}
+
+/// Angle between two vectors, radians.
+fn angle(a: Vec3, b: Vec3) -> f64 {
+    libm::atan2(a.cross(&b).norm(), a.dot(&b))
+}
+
+/// Weight of every free node, newtons, and 1 where a node is free.
+fn weights(group: &Group, gravity: [f64; 3]) -> (Vec<[Pack; 3]>, Vec<Pack>) {
+    let n = group.node.len();
+    let (mut weight, mut free) = (vec![[Pack::default(); 3]; n], vec![Pack::default(); n]);
+    for (i, node) in group.node.iter().enumerate() {
+        for l in 0..LANES {
+            if group.strand[l].is_some() && node.held.0[l] == 0.0 {
+                free[i].0[l] = 1.0;
+                for c in 0..3 {
+                    weight[i][c].0[l] = node.mass.0[l] * gravity[c];
+                }
+            }
+        }
+    }
+    (weight, free)
+}
+
+struct Settle<'a> {
+    group: &'a mut Group,
+    weight: &'a [[Pack; 3]],
+    free: &'a [Pack],
+    sag_free: bool,
+}
+
+impl Kernel for Settle<'_> {
+    type Out = ();
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let g = self.group;
+        rod::relax::<L>(&mut g.node, &mut g.elastic, &g.motion);
+        if self.sag_free {
+            rod::stand::<L>(&mut g.node, &mut g.elastic, &g.motion, self.weight, self.free, &mut Vec::new());
+        }
+    }
+}
+
+/// The lanes whose equilibrium is not stable.
+fn unstable(group: &Group, width: Width) -> [bool; LANES] {
+    let n = group.node.len();
+    let mut tangent: Vec<Column<4, 11>> = vec![[[Pack::default(); 4]; 11]; n];
+    let mut scratch = Scratch::<4, 11>::default();
+    scratch.reserve(n);
+    let mut moved = group.clone();
+    let still: Vec<[Pack; 3]> = vec![[Pack::default(); 3]; n];
+    for colour in 0..COLOURS.min(n) {
+        for c in 0..4 {
+            for sign in [1.0, -1.0] {
+                moved.motion.copy_from_slice(&group.motion);
+                let step = Step { group, moved: &mut moved, scratch: &mut scratch, colour, c, sign };
+                lanes::run(width, step);
+                lanes::run(width, Gradient { group: &moved, still: &still, scratch: &mut scratch });
+                for j in (colour..n).step_by(COLOURS) {
+                    for l in 0..LANES {
+                        let by = 0.5 * sign / (DIFFERENCE * unit(group, j, l, c));
+                        // The lower triangle: rows from this unknown on.
+                        for (r, entry) in tangent[j].iter_mut().enumerate() {
+                            if r >= c && j + r / 4 < n {
+                                entry[c].0[l] -= scratch.rhs[j + r / 4][r % 4].0[l] * by;
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+    let mut scratch = Scratch::<4, 11>::default();
+    scratch.reserve(n);
+    lanes::run(width, Pivots { group, tangent: &tangent, scratch: &mut scratch });
+    std::array::from_fn(|l| (0..n).any(|j| (0..4).any(|c| scratch.factor[j][c][c].0[l] < 0.0)))
+}
+
+/// Size of an unknown: the edge's length, or 1 radian.
+fn unit(group: &Group, j: usize, l: usize, c: usize) -> f64 {
+    if c == 3 { 1.0 } else { group.node[j.min(group.node.len() - 2)].length.0[l] }
+}
+
+/// Moves every node of a colour along one unknown.
+struct Step<'a> {
+    group: &'a Group,
+    moved: &'a mut Group,
+    scratch: &'a mut Scratch<4, 11>,
+    colour: usize,
+    c: usize,
+    sign: f64,
+}
+
+impl Kernel for Step<'_> {
+    type Out = ();
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Step { group, moved, scratch, colour, c, sign } = self;
+        let n = group.node.len();
+        scratch.rhs.fill([Pack::default(); 4]);
+        for j in (colour..n).step_by(COLOURS) {
+            for l in 0..LANES {
+                scratch.rhs[j][c].0[l] = sign * DIFFERENCE * unit(group, j, l, c);
+            }
+        }
+        let mut turned = vec![Pack::default(); n];
+        let Group { node, motion, .. } = moved;
+        rod::apply::<L, 4, 11>(node, motion, &mut turned, &Pack::splat(1.0), scratch);
+    }
+}
+
+/// The gradient of the elastic energy.
+struct Gradient<'a> {
+    group: &'a Group,
+    still: &'a [[Pack; 3]],
+    scratch: &'a mut Scratch<4, 11>,
+}
+
+impl Kernel for Gradient<'_> {
+    type Out = ();
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let g = self.group;
+        // A step so long that inertia vanishes.
+        let mut stage = Stage {
+            h: 1e30,
+            since: 1e30,
+            y: self.still,
+            base: self.still,
+            contact: None,
+            friction: 0.0,
+            refresh: false,
+            air: None,
+            active: Pack::splat(1.0),
+        };
+        let turned = vec![Pack::default(); g.node.len()];
+        let damping = Damping(0.0);
+        rod::sweep::<L, 4, 11>(&g.node, &g.elastic, &g.motion, &turned, damping, &mut stage, self.scratch, false);
+    }
+}
+
+/// Factors the tangent; the inverse pivots are left in the factor.
+struct Pivots<'a> {
+    group: &'a Group,
+    tangent: &'a [Column<4, 11>],
+    scratch: &'a mut Scratch<4, 11>,
+}
+
+impl Kernel for Pivots<'_> {
+    type Out = ();
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let n = self.tangent.len();
+        let mut window: Window<L, 4, 11> = [Panel::zero(); RING];
+        self.scratch.rhs.fill([Pack::default(); 4]);
+        for j in 0..n + RING {
+            if j < n {
+                let node = &self.group.node[j];
+                for r in 0..11 {
+                    for c in 0..4 {
+                        window[j % RING].0[r][c] = L::load(&self.tangent[j][r][c]);
+                    }
+                }
+                for c in 0..4 {
+                    let held = L::load(if c == 3 { &node.held_turn } else { &node.held });
+                    let one = if c == 3 && j + 1 == n { L::splat(1.0) } else { L::splat(0.0) };
+                    window[j % RING].0[c][c] = window[j % RING].0[c][c] + held + one;
+                }
+            }
+            // Updates reach two nodes ahead, so those must be there before.
+            if j >= 2 && j - 2 < n {
+                let k = j - 2;
+                band::eliminate::<L, 4, 11>(k, &mut window, &mut self.scratch.factor[k], &mut self.scratch.rhs);
+            }
+        }
+    }
+}

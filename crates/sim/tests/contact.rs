@@ -1,0 +1,89 @@
+//! Hair against solid bodies.
+
+mod common;
+
+use common::{GRAVITY, Shot, Vec3, turned};
+use pelage_geom::{Bvh, Topology, shapes};
+use pelage_sim::body::{Exact, Field, FieldSettings};
+use pelage_sim::{Body, Part, Settings, Shape};
+
+/// A ball as a mesh with its field.
+struct Ball {
+    bvh: Bvh,
+    field: Field,
+}
+
+fn ball(radius: f64) -> Ball {
+    let mesh = shapes::cube_sphere(48, radius);
+    let topology = Topology::new(&mesh);
+    let bvh = Bvh::build(&mesh.position, &mesh.triangle, &topology);
+    let field =
+        Field::build(&mesh.position, &mesh.triangle, &topology, &bvh, &FieldSettings::default(), None);
+    Ball { bvh, field }
+}
+
+/// Hairs that stand on the upper half of a ball and lean over.
+fn tuft(radius: f64, count: usize, length: f64, points: usize) -> Vec<Vec<[f64; 3]>> {
+    (0..count)
+        .map(|k| {
+            let around = 2.4 * k as f64;
+            let up = 0.3 + 0.65 * (k as f64 + 0.5) / count as f64;
+            let flat = (1.0f64 - up * up).sqrt();
+            let n = Vec3::new(flat * libm::cos(around), up, flat * libm::sin(around));
+            let down = (-Vec3::y() + n * n.y).normalize();
+            (0..points)
+                .map(|i| {
+                    let s = length * i as f64 / (points - 1) as f64;
+                    let a = s / radius;
+                    // Around the ball and slowly away from it.
+                    let out = n * libm::cos(a) + down * libm::sin(a);
+                    (out * (radius * (1.0 + 0.05 * s / length))).into()
+                })
+                .collect()
+        })
+        .collect()
+}
+
+#[test]
+fn hair_on_a_shaking_ball_stays_outside() {
+    let radius = 0.09;
+    let b = ball(radius);
+    let hairs = tuft(radius, 64, 0.2, 41);
+    for (speed, friction) in [(1.0, 0.0), (1.0, 0.3)] {
+        let mut shot = Shot::new(&hairs, &Settings { friction, ..Settings::default() }, GRAVITY);
+        println!("stiffened {}", shot.started.stiffened.len());
+        for frame in 0..24 {
+            let angle = |f: f64| 1.0 * libm::sin(speed * 2.0 * std::f64::consts::PI * 1.0 * (frame as f64 + f) / 24.0);
+            let motion = move |f: f64| turned(Vec3::new(0.2, 1.0, 0.0), angle(f));
+            let body = Body {
+                parts: vec![Part {
+                    motion: &motion,
+                    shape: Shape::Field(&b.field),
+                    exact: Some(Exact { bvh: &b.bvh, velocity: None }),
+                }],
+                seconds: 1.0 / 24.0,
+            };
+            let start = std::time::Instant::now();
+            shot.go(1.0 / 24.0, &motion, &body, None);
+            let t = start.elapsed().as_secs_f64();
+            let at = body.at(1.0);
+            let mut deepest = 0.0f64;
+            for h in 0..hairs.len() {
+                for p in &shot.hair(h)[1..] {
+                    if let Some(hit) = at.exact(*p, 0.0) {
+                        deepest = deepest.max(-hit.distance);
+                    }
+                }
+            }
+            if frame % 6 == 5 {
+                println!(
+                    "speed {speed} frame {frame}: deepest {:.4} mm corrected {} strain {:.1e} steps {} sub {} shortest {:.1e} solves/step {:.2} held {} ns/node/step {:.0}",
+                    deepest * 1e3, shot.last.corrected, shot.last.largest_strain, shot.last.steps, shot.last.subdivided,
+                    shot.last.shortest_step, shot.last.particle_solves as f64 / shot.last.particle_steps as f64, shot.last.held.len(),
+                    t * 2e9 / shot.last.particle_steps as f64
+                );
+            }
+            assert!(deepest < 1e-4, "frame {frame}: {deepest}");
+        }
+    }
+}
