@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::cache::FileHashes;
-use crate::config::{Document, Feature, GroomFile, Material, SEGMENTS, ShotFile, Target};
+use crate::config::{BodyMesh, Document, Feature, GroomFile, Material, MeshShape, SEGMENTS, ShotFile, Target};
 use crate::format::csv;
 use pelage_geom::RigidMotion;
 use pelage_geom::motion::RigidTransform;
@@ -77,6 +77,17 @@ impl SkinMotion {
     }
 }
 
+/// A mesh that hair can't enter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyFile {
+    /// The mesh.
+    pub file: InputFile,
+    /// What stands for it.
+    pub shape: MeshShape,
+    /// Its motion, if it moves.
+    pub motion: Option<SkinMotion>,
+}
+
 /// A shot with its input files.
 #[derive(Debug)]
 pub struct Project {
@@ -94,6 +105,8 @@ pub struct Project {
     pub frames: BTreeMap<i32, SkinAt>,
     /// The skin at frames of the pre-roll that a sequence has files for.
     pub before: BTreeMap<i32, SkinAt>,
+    /// Meshes besides the skin that hair can't enter.
+    pub bodies: Vec<BodyFile>,
     /// The motion of a skin that moves as a whole.
     pub motion: Option<SkinMotion>,
     /// Every map, by the path written in the groom file: UDIM number (0 without tiles) and file.
@@ -135,6 +148,7 @@ impl Project {
         let curves = curves.map(|c| find.file(&shot, "groom.curves", c)).transpose()?;
         let motion = find.motion(&shot)?;
         let [frames, before] = find.frames(&shot, motion.as_ref())?;
+        let bodies = if simulated { find.bodies(&shot)? } else { Vec::new() };
         let drawn = groom.value.control.placement.curves.as_ref();
         let drawn = drawn.map(|p| find.file(&groom, "control.placement.curves", p)).transpose()?;
         let mut maps = BTreeMap::new();
@@ -145,7 +159,7 @@ impl Project {
             }
         }
         hashes.save();
-        Ok(Project { shot, groom, rest, curves, drawn, frames, before, motion, maps })
+        Ok(Project { shot, groom, rest, curves, bodies, drawn, frames, before, motion, maps })
     }
 
     /// Folder of the shot's outputs.
@@ -301,16 +315,39 @@ impl Finder<'_> {
     }
 
     fn motion(&mut self, doc: &Document<ShotFile>) -> Result<Option<SkinMotion>, Error> {
-        let (groom, shot) = (&doc.value.groom, &doc.value.shot);
+        let groom = &doc.value.groom;
         let (path, start, pivot, key) = match &doc.value.skin {
             Some(skin) => (&skin.motion, skin.motion_start, skin.pivot, "skin.motion"),
             None => (&groom.motion, groom.motion_start, groom.pivot, "groom.motion"),
         };
-        let Some(path) = path else { return Ok(None) };
+        path.as_ref().map(|path| self.table(doc, key, path, start, pivot)).transpose()
+    }
+
+    fn table(
+        &mut self,
+        doc: &Document<ShotFile>,
+        key: &str,
+        path: &Path,
+        start: Option<f64>,
+        pivot: [f64; 3],
+    ) -> Result<SkinMotion, Error> {
+        let shot = &doc.value.shot;
         let file = self.file(doc, key, path)?;
         let motion = csv::read_motion(&file.path, shot.meters_per_unit, shot.fps)?;
         let start = start.unwrap_or(f64::from(shot.frames[0]));
-        Ok(Some(SkinMotion { file, motion, start, pivot, fps: shot.fps }))
+        Ok(SkinMotion { file, motion, start, pivot, fps: shot.fps })
+    }
+
+    fn bodies(&mut self, doc: &Document<ShotFile>) -> Result<Vec<BodyFile>, Error> {
+        let meshes = doc.value.simulate.body.mesh.iter().enumerate();
+        let body = |(i, m): (usize, &BodyMesh)| {
+            let key = |name: &str| format!("simulate.body.mesh[{i}].{name}");
+            let file = self.file(doc, &key("file"), &m.file)?;
+            let path = m.motion.as_ref();
+            let motion = path.map(|p| self.table(doc, &key("motion"), p, m.motion_start, m.pivot)).transpose()?;
+            Ok(BodyFile { file, shape: m.shape, motion })
+        };
+        meshes.map(body).collect()
     }
 
     /// The skin at every frame of the shot, and at those of the pre-roll that there are files for.

@@ -55,10 +55,11 @@ impl<'a> Timeline<'a> {
         ((i64::from(frame) - self.first) / self.checkpoint) as u32
     }
 
-    /// Frames that are simulated in a stretch, pre-roll included. Each ends a span that begins a frame before it.
+    /// Frames that are simulated in a stretch, pre-roll included. Each ends a span that begins a frame before it. Without
+    /// pre-roll the first frame is where it starts.
     pub fn simulated(&self, k: u32) -> RangeInclusive<i64> {
         let frames = self.stretch(k);
-        if k == 0 && self.preroll > 0 { self.start() + 1..=*frames.end() } else { frames }
+        if k == 0 { self.start() + 1..=*frames.end() } else { frames }
     }
 
     /// Seconds at a frame number. They do not depend on where the shot begins.

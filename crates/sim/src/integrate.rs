@@ -228,9 +228,7 @@ fn step<A: Around>(
     let (mut converged, mut touched) = (lanes, false);
     let start = held_positions(g);
     let blowing = around.air(g, lanes, at.start, &mut work.air);
-    for (second, fraction, since) in
-        [(false, at.start + GAMMA * at.length, h), (true, at.start + at.length, dt - h)]
-    {
+    for (second, fraction, since) in [(false, at.start + GAMMA * at.length, h), (true, at.start + at.length, dt - h)] {
         let gravity = around.gravity(fraction);
         let rest = dt - h;
         let Work { y, base, from, .. } = work;

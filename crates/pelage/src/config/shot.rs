@@ -250,7 +250,7 @@ impl Document<ShotFile> {
         Ok(())
     }
 
-    fn check_motion(&self, table: &str, start: Option<f64>, pivot: [f64; 3]) -> Result<(), ConfigError> {
+    pub(super) fn check_motion(&self, table: &str, start: Option<f64>, pivot: [f64; 3]) -> Result<(), ConfigError> {
         if start.is_some_and(|x| !x.is_finite()) {
             let help = "it is the frame at which the motion's time is 0";
             return Err(self.error(&format!("{table}.motion_start"), "must be a finite number", help));

@@ -1,6 +1,7 @@
 //! The stages of a shot. `plan` says what each step reads; a stage file runs its steps: read, call one pure function,
 //! write.
 
+mod body;
 mod plan;
 mod plan_simulate;
 mod run;

@@ -62,6 +62,7 @@ pub struct Runner<'a> {
     pub(super) placed: Option<pelage_groom::control::ControlHairs>,
     pub(super) control: Option<Rc<pelage_groom::control::ControlHairs>>,
     pub(super) curves: Option<Rc<super::curves::CurveHair>>,
+    pub(super) colliders: Option<Rc<super::body::Colliders>>,
     pub(super) running: Option<super::simulate::Running>,
     /// Frames that this run simulated (true), or took over from a run that was killed or ended earlier.
     simulated: BTreeMap<i64, bool>,
@@ -97,6 +98,7 @@ impl<'a> Runner<'a> {
             placed: None,
             control: None,
             curves: None,
+            colliders: None,
             running: None,
             simulated: BTreeMap::new(),
             hashes: RefCell::new(FileHashes::open(&cache)),

@@ -1,7 +1,7 @@
 //! Simulate: hair in motion, one stretch of frames after another, each from the checkpoint at the end of the one before.
 
 use super::run::{Counts, Runner};
-use super::{What, curves, groom, instance, interpolate};
+use super::{What, body, curves, groom, instance, interpolate};
 use crate::Error;
 use crate::cache::LongStep;
 use crate::config::{StrandModel, Target};
@@ -11,7 +11,7 @@ use crate::timeline::Timeline;
 use pelage_geom::ride::{Ride, ease_positions, rides};
 use pelage_geom::{Offsets, Pose, SurfacePoint, Vec3};
 use pelage_groom::control;
-use pelage_sim::{Body, Hairs, Model, Rigid, Root, Settings, SimError, Simulation, Span, SpanReport, Started, Wind};
+use pelage_sim::{Hairs, Model, Rigid, Root, Settings, SimError, Simulation, Span, SpanReport, Started};
 use rayon::prelude::*;
 use std::time::Instant;
 
@@ -109,7 +109,7 @@ pub fn make(run: &mut Runner<'_>, what: What) -> Result<(), Error> {
             running
         }
     };
-    for frame in first..=begin {
+    for frame in first..=at.unwrap_or(first - 1) {
         run.simulated(frame, false);
     }
     advance(run, &timeline, &mut running, &mut step, k, end)?;
@@ -288,32 +288,37 @@ fn list(ids: &[u64]) -> String {
     named.join(", ") + &more
 }
 
-/// Where the roots are at a frame: in the world, or for a skin that moves as a whole, at rest.
-fn root_rides(run: &mut Runner<'_>, timeline: &Timeline<'_>, source: &Source, frame: i64) -> Result<Vec<Ride>, Error> {
-    let arrival = timeline.arrival();
-    if timeline.rigid(arrival, 0.0).is_some() {
-        return Ok(source.anchor.iter().map(|a| Ride::still(*a)).collect());
+/// Vertices of a skin that deforms, at a frame; `None` for one that moves as a whole.
+fn skin_position(run: &mut Runner<'_>, timeline: &Timeline<'_>, frame: i64) -> Result<Option<Vec<[f64; 3]>>, Error> {
+    if !body::deforms(timeline) {
+        return Ok(None);
     }
-    let skin = groom::skin(run)?;
+    let (skin, arrival) = (groom::skin(run)?, timeline.arrival());
     let read = |frame: i64| match timeline.skin_at(frame) {
         Some(SkinAt::File(file)) => Ok(ply::read_frame(&file.path, skin.mesh.position.len(), skin.faces())?),
         _ => Ok::<_, Error>(skin.mesh.position.clone()),
     };
-    let position = if frame >= arrival {
-        read(frame)?
-    } else {
-        let target = read(arrival)?;
-        let next = if timeline.skin_at(arrival + 1).is_some() { read(arrival + 1)? } else { target.clone() };
-        let (s, frames) = timeline.way(arrival, frame);
-        ease_positions(&skin.mesh.position, &target, &next, frames, s)
-    };
-    let pose = Pose::new(&skin.mesh, &skin.topology, position);
+    if frame >= arrival {
+        return read(frame).map(Some);
+    }
+    let target = read(arrival)?;
+    let next = if timeline.skin_at(arrival + 1).is_some() { read(arrival + 1)? } else { target.clone() };
+    let (s, frames) = timeline.way(arrival, frame);
+    Ok(Some(ease_positions(&skin.mesh.position, &target, &next, frames, s)))
+}
+
+/// Where the roots are on a skin that deforms; at rest for one that moves as a whole.
+fn root_rides(run: &mut Runner<'_>, source: &Source, position: Option<&[[f64; 3]]>) -> Result<Vec<Ride>, Error> {
+    let Some(position) = position else { return Ok(source.anchor.iter().map(|a| Ride::still(*a)).collect()) };
+    let skin = groom::skin(run)?;
+    let pose = Pose::new(&skin.mesh, &skin.topology, position.to_vec());
     Ok(rides(&skin.mesh, &skin.topology, &skin.rest, &pose, &source.root, &source.anchor))
 }
 
 /// Without pre-roll the simulation starts at the first frame: there the skin must be at rest.
 fn check_at_rest(run: &mut Runner<'_>, timeline: &Timeline<'_>, source: &Source) -> Result<(), Error> {
-    let mut now = root_rides(run, timeline, source, timeline.first)?;
+    let position = skin_position(run, timeline, timeline.first)?;
+    let mut now = root_rides(run, source, position.as_deref())?;
     if let Some(t) = timeline.rigid(timeline.first, timeline.first as f64) {
         let place = |r: &mut Ride| *r = Ride { position: t.apply(Vec3::from(r.position)).into(), rotation: t.rotation };
         now.iter_mut().for_each(place);
@@ -364,21 +369,41 @@ fn advance(
     let (gravity, wind) = (shot.simulate.gravity.downward(shot.shot.up), shot.simulate.wind.as_ref());
     let (layer, arrival) = (&project.groom.value.layer[running.layer].name, timeline.arrival());
     let origin = run.origin()?;
-    let mut before = root_rides(run, timeline, &running.source, running.frame)?;
+    let colliders = body::colliders(run, body::deforms(timeline))?;
+    let seconds = 1.0 / shot.shot.fps;
+    let position = skin_position(run, timeline, running.frame)?;
+    let mut before = root_rides(run, &running.source, position.as_deref())?;
+    let mut end_before = colliders.end(position.as_deref(), unit);
     let (mut saved, mut saving) = (Instant::now(), 0.0);
+    // Without pre-roll the first frame is the start.
+    if running.frame == timeline.first
+        && k == 0
+        && timeline.preroll == 0
+        && !step.files().any(|f| f.starts_with("frame"))
+    {
+        keep_frame(run, running, step, unit, origin)?;
+        checkpoint(running, step).map_err(disk())?;
+    }
     while running.frame < end {
         let (from, frame) = (running.frame as f64, running.frame + 1);
-        let now = root_rides(run, timeline, &running.source, frame)?;
+        let position = skin_position(run, timeline, frame)?;
+        let now = root_rides(run, &running.source, position.as_deref())?;
+        let end_now = colliders.end(position.as_deref(), unit);
+        let ends_of_skin = end_before.clone().zip(end_now.clone());
+        let moving = ends_of_skin.and_then(|(a, b)| colliders.moving([a, b], seconds));
         let begin = roots(&before, None, unit);
         let ends = roots(&now, Some(&begin), unit);
         let motion = |f: f64| timeline.rigid(arrival, from + f).map_or(Rigid::default(), |t| placement(&t, unit));
-        let wind = wind.map(|w| Wind { velocity: w.velocity.vectors().at(from + 0.5) });
+        let wind = wind.map(|w| w.at(from + 0.5, shot.shot.fps));
+        let own = colliders.motions(from, unit);
+        let body = colliders.body(&motion, &own, moving.as_ref(), seconds);
         let span = Span {
-            seconds: 1.0 / shot.shot.fps,
+            seconds,
             time: timeline.seconds(from),
             motion: &motion,
             roots: [&begin, &ends],
-            body: &Body::default(),
+            tips: None,
+            body: &body,
             gravity: [gravity.at(from), gravity.at(frame as f64)],
             wind: wind.as_ref(),
         };
@@ -388,21 +413,39 @@ fn advance(
         running.frame = frame;
         note(run, layer, frame, &report, step.counts(), clock.elapsed().as_secs_f64());
         if frame >= *timeline.stretch(k).start() {
-            let scene = |p: &[f64; 3]| std::array::from_fn::<f32, 3, _>(|x| (p[x] / unit - origin[x]) as f32);
-            let positions: Vec<[f32; 3]> = running.sim.positions().par_iter().map(scene).collect();
-            step.write(&frame_file(frame), &frame_bytes(frame, &positions)).map_err(disk())?;
-            run.simulated(frame, true);
+            keep_frame(run, running, step, unit, origin)?;
         }
         if frame == end || saved.elapsed().as_secs_f64() * SAVING >= saving {
             let clock = Instant::now();
-            let (name, state) = (state_file(frame), running.sim.save());
-            let bytes = mcap::write_state_payload("state", frame, &state);
-            step.write(&name, &bytes).and_then(|()| step.save("state.", &name)).map_err(disk())?;
+            checkpoint(running, step).map_err(disk())?;
             (saved, saving) = (Instant::now(), clock.elapsed().as_secs_f64());
         }
-        before = now;
+        (before, end_before) = (now, end_now);
     }
     Ok(())
+}
+
+/// Keeps the frame that the hair has come to.
+fn keep_frame(
+    run: &mut Runner<'_>,
+    running: &Running,
+    step: &mut LongStep,
+    unit: f64,
+    origin: [f64; 3],
+) -> Result<(), Error> {
+    let scene = |p: &[f64; 3]| std::array::from_fn::<f32, 3, _>(|x| (p[x] / unit - origin[x]) as f32);
+    let positions: Vec<[f32; 3]> = running.sim.positions().par_iter().map(scene).collect();
+    let bytes = frame_bytes(running.frame, &positions);
+    step.write(&frame_file(running.frame), &bytes).map_err(Error::disk(&run.project.cache_dir()))?;
+    run.simulated(running.frame, true);
+    Ok(())
+}
+
+/// Keeps the state, from which a run goes on after a kill.
+fn checkpoint(running: &Running, step: &mut LongStep) -> std::io::Result<()> {
+    let name = state_file(running.frame);
+    step.write(&name, &mcap::write_state_payload("state", running.frame, &running.sim.save()))?;
+    step.save("state.", &name)
 }
 
 fn frame_bytes(frame: i64, positions: &[[f32; 3]]) -> Vec<u8> {
@@ -413,7 +456,7 @@ fn frame_bytes(frame: i64, positions: &[[f32; 3]]) -> Vec<u8> {
 }
 
 /// `world = rotation (rest - pivot) + pivot + translation` in metres, without the pivot.
-fn placement(t: &pelage_geom::motion::RigidTransform, unit: f64) -> Rigid {
+pub(super) fn placement(t: &pelage_geom::motion::RigidTransform, unit: f64) -> Rigid {
     let at = t.apply(Vec3::zeros()) * unit;
     Rigid { rotation: t.rotation, translation: at.into() }
 }
@@ -425,7 +468,8 @@ fn note(run: &mut Runner<'_>, layer: &str, frame: i64, r: &SpanReport, counts: &
         *at = n.max(*at);
     };
     most(SLEEPING, r.sleeping);
-    most("points in contact", r.contacts);
+    most("points that the exact mesh pushed out", r.corrected);
+    most("deepest point, micrometres", (r.deepest * 1e6).round() as u64);
     most("strands that took steps of their own", r.subdivided);
     most("largest strain, millionths", (r.largest_strain * 1e6).round() as u64);
     let values = [r.particle_steps, r.teleported, r.held.len() as u64, r.bad_roots.len() as u64];

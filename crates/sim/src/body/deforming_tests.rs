@@ -70,9 +70,8 @@ impl Frames {
 fn sphere(shift: f64, angle: f64, stretch: f64) -> Frames {
     let mesh = cube_sphere(32, 0.1);
     let turn = UnitQuaternion::from_scaled_axis(Vec3::new(0.2, 0.9, 0.4).normalize() * angle);
-    let moved = |p: &[f64; 3]| {
-        (turn * Vec3::new(p[0], p[1] * stretch, p[2]) + Vec3::new(0.8, 0.36, 0.48) * shift).into()
-    };
+    let moved =
+        |p: &[f64; 3]| (turn * Vec3::new(p[0], p[1] * stretch, p[2]) + Vec3::new(0.8, 0.36, 0.48) * shift).into();
     let pose = [mesh.position.clone(), mesh.position.iter().map(moved).collect()];
     Frames::new(mesh, pose)
 }
@@ -90,7 +89,12 @@ fn two_sides_beat_one_and_the_fixed_point_beats_both() {
     for (case, frames) in &cases {
         let error = frames.schemes();
         for (n, e) in name.iter().zip(error) {
-            println!("{case}: {n}: mean {:.3}, 99 % {:.3}, most {:.3} voxels", e[0] / VOXEL, e[1] / VOXEL, e[2] / VOXEL);
+            println!(
+                "{case}: {n}: mean {:.3}, 99 % {:.3}, most {:.3} voxels",
+                e[0] / VOXEL,
+                e[1] / VOXEL,
+                e[2] / VOXEL
+            );
         }
         let [naive, forward, paper, ours] = error.map(|e| e[1]);
         assert!(ours <= 1.05 * paper && ours <= 1.05 * forward && ours < naive, "{case}");

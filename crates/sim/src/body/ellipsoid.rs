@@ -35,9 +35,8 @@ impl Ellipsoid {
         let (value, vector) = eigen::symmetric([0, 1, 2].map(|i| [0, 1, 2].map(|j| second[(i, j)])));
         let [x, y, z] = vector.map(Vec3::from);
         let z = if x.cross(&y).dot(&z) < 0.0 { -z } else { z };
-        let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[
-            x, y, z,
-        ])));
+        let turn =
+            UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, y, z])));
         let c = turn.coords;
         let placement = Rigid { rotation: [c.x, c.y, c.z, c.w], translation: mean.into() };
         Some(Ellipsoid { placement, semi_axes: value.map(|v| (3.0 * v.max(0.0)).sqrt()) })
@@ -110,10 +109,7 @@ mod tests {
 
     fn some(semi_axes: [f64; 3]) -> Ellipsoid {
         let q = UnitQuaternion::from_scaled_axis(Vec3::new(0.3, -0.8, 0.5)).coords;
-        Ellipsoid {
-            placement: Rigid { rotation: [q.x, q.y, q.z, q.w], translation: [0.3, -0.1, 0.2] },
-            semi_axes,
-        }
+        Ellipsoid { placement: Rigid { rotation: [q.x, q.y, q.z, q.w], translation: [0.3, -0.1, 0.2] }, semi_axes }
     }
 
     /// Distance by a fine net of points on the surface, refined around the best.

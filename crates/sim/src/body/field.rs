@@ -129,7 +129,8 @@ impl Field {
 
     /// Memory held, bytes.
     pub fn bytes(&self) -> usize {
-        4 * (self.brick.len() + self.centre.len() + self.distance.len()) + 12 * (self.foot.len() + self.corner_foot.len())
+        4 * (self.brick.len() + self.centre.len() + self.distance.len())
+            + 12 * (self.foot.len() + self.corner_foot.len())
     }
 
     /// Number of bricks.
@@ -383,7 +384,8 @@ impl Field {
             .par_iter()
             .map(|&row| {
                 let mut limit = f64::INFINITY;
-                let corner = |i: usize| Vec3::from(low) + Vec3::new(i as f64, (row % ny) as f64, (row / ny) as f64) * size;
+                let corner =
+                    |i: usize| Vec3::from(low) + Vec3::new(i as f64, (row % ny) as f64, (row / ny) as f64) * size;
                 let at = |i: usize| {
                     let found = query(bvh, corner(i), limit);
                     limit = (corner(i + 1) - found.position).norm();

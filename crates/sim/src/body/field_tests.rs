@@ -60,7 +60,11 @@ fn the_bust_is_within_half_a_voxel() {
         band(&mesh, &bvh, 100_000).iter().map(|(p, d)| (field.sample(*p).distance - d).abs()).collect();
     off.sort_by(f64::total_cmp);
     let (mean, last) = (off.iter().sum::<f64>() / off.len() as f64, off[off.len() - 1]);
-    println!("bust, {} points: mean {mean:.2e}, 99.9 % {:.2e}, most {last:.2e} m", off.len(), off[off.len() * 999 / 1000]);
+    println!(
+        "bust, {} points: mean {mean:.2e}, 99.9 % {:.2e}, most {last:.2e} m",
+        off.len(),
+        off[off.len() * 999 / 1000]
+    );
     assert!(mean < 0.02 * 0.004 && last < 0.5 * 0.004);
 }
 
@@ -247,25 +251,51 @@ fn timing() {
     let c = cpu();
     for _ in 0..5 {
         let f = Field::build(&mesh.position, &mesh.triangle, &topology, &bvh, &FieldSettings::default(), None);
-        println!("bricks {} of {} bytes {} known {}", f.bricks(), f.brick.len(), f.bytes(), f.foot.iter().filter(|f| f.triangle != NONE).count());
+        println!(
+            "bricks {} of {} bytes {} known {}",
+            f.bricks(),
+            f.brick.len(),
+            f.bytes(),
+            f.foot.iter().filter(|f| f.triangle != NONE).count()
+        );
     }
     println!("{} ms cpu a build", (cpu() - c) / 5.0);
     let f = Field::build(&mesh.position, &mesh.triangle, &topology, &bvh, &FieldSettings::default(), None);
-    let near: Vec<Vec3> = (0..1000000).map(|i| random_in(i, [-0.2; 3], [0.2; 3])).filter(|p| f.sample(*p).distance.abs() < 0.01).collect();
-    let far: Vec<Vec3> = (0..100000).map(|i| random_in(i, [-0.2; 3], [0.2; 3])).filter(|p| f.sample(*p).distance > 0.04).collect();
+    let near: Vec<Vec3> = (0..1000000)
+        .map(|i| random_in(i, [-0.2; 3], [0.2; 3]))
+        .filter(|p| f.sample(*p).distance.abs() < 0.01)
+        .collect();
+    let far: Vec<Vec3> =
+        (0..100000).map(|i| random_in(i, [-0.2; 3], [0.2; 3])).filter(|p| f.sample(*p).distance > 0.04).collect();
     for (name, pts) in [("near", near), ("far", far)] {
         let c = cpu();
         let mut s = 0.0;
         let rep = 10_000_000 / pts.len();
-        for _ in 0..rep { for p in &pts { s += f.sample(*p).distance; } }
+        for _ in 0..rep {
+            for p in &pts {
+                s += f.sample(*p).distance;
+            }
+        }
         let t = cpu() - c;
         let c = cpu();
-        for _ in 0..rep { for p in &pts { s += f.distance_bound(*p); } }
+        for _ in 0..rep {
+            for p in &pts {
+                s += f.distance_bound(*p);
+            }
+        }
         let tb = cpu() - c;
         let c = cpu();
-        for p in &pts[..50000.min(pts.len())] { let d = f.sample(*p).distance.abs() + 0.004; s += bvh.closest(*p, d).map_or(0.0, |c| c.signed_distance); }
+        for p in &pts[..50000.min(pts.len())] {
+            let d = f.sample(*p).distance.abs() + 0.004;
+            s += bvh.closest(*p, d).map_or(0.0, |c| c.signed_distance);
+        }
         let tq = (cpu() - c) * 1e6 / 50000.min(pts.len()) as f64;
-        println!("{name} {} sample {} ns bound {} ns closest {tq} ns {s}", pts.len(), t * 1e6 / (rep * pts.len()) as f64, tb * 1e6 / (rep * pts.len()) as f64);
+        println!(
+            "{name} {} sample {} ns bound {} ns closest {tq} ns {s}",
+            pts.len(),
+            t * 1e6 / (rep * pts.len()) as f64,
+            tb * 1e6 / (rep * pts.len()) as f64
+        );
     }
 }
 #[test]
@@ -274,10 +304,22 @@ fn timing2() {
     let (f, bvh) = with(&mesh, &FINE, None);
     let cells = f.cells_with_bricks();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    let sched = || std::fs::read_to_string("/proc/thread-self/schedstat").unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
+    let sched = || {
+        std::fs::read_to_string("/proc/thread-self/schedstat")
+            .unwrap()
+            .split(' ')
+            .next()
+            .unwrap()
+            .parse::<f64>()
+            .unwrap()
+    };
     let t = sched();
     let mut n = 0usize;
-    for &c in &cells { let (d, foot) = f.sample_brick(&bvh, c); n += foot.iter().filter(|f| f.triangle != NONE).count(); std::hint::black_box(d); }
+    for &c in &cells {
+        let (d, foot) = f.sample_brick(&bvh, c);
+        n += foot.iter().filter(|f| f.triangle != NONE).count();
+        std::hint::black_box(d);
+    }
     println!("bricks {} ms, {n} feet, {} ns", (sched() - t) / 1e6, (sched() - t) / n as f64);
     let t = sched();
     let mut s = 0.0;
@@ -287,7 +329,8 @@ fn timing2() {
         for (k, p) in mesh.position.iter().enumerate().take(9000).step_by(3) {
             let p = Vec3::from(*p) + random_in(k as u64, [-1.0; 3], [1.0; 3]).normalize() * d;
             let c = bvh.closest(p, d).map_or(0.0, |c| c.signed_distance);
-            s += c; n += 1;
+            s += c;
+            n += 1;
         }
         println!("{d}: {} ns", (sched() - t) / 3000.0);
     }

@@ -177,7 +177,9 @@ impl Instant<'_, '_> {
     /// A lower bound of the distance where the point is outside, zero or less inside; cheaper than [`Instant::sample`].
     pub fn distance_bound(&self, p: Vec3) -> f64 {
         let parts = self.body.parts.iter().zip(&self.placed);
-        parts.map(|(part, placed)| part.shape.distance_bound(placed.invert(p), self.alpha)).fold(f64::INFINITY, f64::min)
+        parts
+            .map(|(part, placed)| part.shape.distance_bound(placed.invert(p), self.alpha))
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// The nearest of the exact meshes, which are those at the end of the span: ask at `alpha` = 1. `None` where none is

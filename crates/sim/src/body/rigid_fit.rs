@@ -24,7 +24,8 @@ pub fn rigid_fit(from: &[[f64; 3]], to: &[[f64; 3]]) -> RigidFit {
         let finite = |(a, b): &(&[f64; 3], &[f64; 3])| a.iter().chain(b.iter()).all(|x| x.is_finite());
         from.iter().zip(to).filter(finite).map(|(a, b)| (Vec3::from(*a), Vec3::from(*b)))
     };
-    let (sum_a, sum_b, n) = pairs().fold((Vec3::zeros(), Vec3::zeros(), 0.0), |s, (a, b)| (s.0 + a, s.1 + b, s.2 + 1.0));
+    let (sum_a, sum_b, n) =
+        pairs().fold((Vec3::zeros(), Vec3::zeros(), 0.0), |s, (a, b)| (s.0 + a, s.1 + b, s.2 + 1.0));
     if n == 0.0 {
         return RigidFit { motion: Rigid::default(), rms: 0.0, largest: 0.0 };
     }
