@@ -321,7 +321,7 @@ fn the_skin_and_other_meshes_keep_hair_out() {
 }
 
 #[test]
-#[ignore = "soft hair in contact gives other bytes for another number of threads: a fault of the contact step"]
+#[ignore = "soft hair in contact gives other bytes for another number of threads: not located yet, without a body it does not"]
 fn threads_do_not_show_in_soft_hair_in_contact() {
     let shot = simulated_shot(COMMAND, 4);
     shot.edit(SHOT, "segments = 8", "segments = 8\nsag_free = false");
