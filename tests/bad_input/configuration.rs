@@ -84,7 +84,7 @@ fn wrong_types_and_missing_tables() {
         ("\"grooms/ball.ply\"", "[\"grooms/ball.ply\"]", "line 8"),
         ("size = [160, 120]", "size = [160, -120]", "line"),
         ("[groom]\nfile = \"grooms/ball.toml\"\n", "", "groom"),
-        ("[groom]\nfile = \"grooms/ball.toml\"", "[groom]", "file"),
+        ("[groom]\nfile = \"grooms/ball.toml\"", "[groom]", "groom|where hair comes from|help:"),
         ("rest = \"grooms/ball.ply\"\n", "", "rest"),
         ("fps = 24\n", "", "fps"),
         ("meters_per_unit = 0.01\n", "", "meters_per_unit"),
@@ -174,6 +174,12 @@ fn values_of_the_simulation() {
         ("wind = { velocity = [1, 2] }", "line|array of 3 values"),
         ("wind = { velocity = [1, 2, inf] }", "simulate.wind.velocity|out of range|m/s"),
         ("frction = 0.3", "did you mean `friction`?"),
+        ("wind = { velocity = [1, 0, 0], gust = -200 }", "simulate.wind.gust|out of range"),
+        ("wind = { velocity = [1, 0, 0], turbulence_size = 0 }", "simulate.wind.turbulence_size|out of range"),
+        ("body = { voxel = 0 }", "simulate.body.voxel|out of range|millimetres"),
+        ("body = { voxels = 1 }", "did you mean `voxel`?"),
+        ("body = { mesh = [{ file = \"a\", shape = \"ball\" }] }", "unknown variant `ball`"),
+        ("body = { mesh = [{ file = \"a\", pivot = [nan, 0, 0] }] }", "simulate.body.mesh[0].pivot"),
     ] {
         corpus.refuse_edit(SHOT, "target = \"off\"", &simulate(text), &format!("pipeline.toml, line|{words}"));
     }

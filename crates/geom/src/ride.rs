@@ -1,7 +1,7 @@
 //! How points of a skin have moved since rest, and how a skin comes from its rest pose into a motion.
 
 use crate::motion::RigidTransform;
-use crate::{Mesh, Pose, SurfacePoint, Topology, Vec3};
+use crate::{Mesh, Offsets, Pose, SurfacePoint, Topology, Vec3};
 use nalgebra::{Quaternion, UnitQuaternion};
 use rayon::prelude::*;
 
@@ -21,16 +21,39 @@ impl Ride {
     }
 }
 
-/// Roots on the skin at `now`, turned from `rest`.
-pub fn rides(mesh: &Mesh, topology: &Topology, rest: &Pose, now: &Pose, root: &[SurfacePoint]) -> Vec<Ride> {
-    let ride = |p: &SurfacePoint| {
+/// Roots at `now`, turned from `rest` with the skin at their points `root`. `anchor` is where they are at rest: on the
+/// skin or beside it, where they stay.
+pub fn rides(
+    mesh: &Mesh,
+    topology: &Topology,
+    rest: &Pose,
+    now: &Pose,
+    root: &[SurfacePoint],
+    anchor: &[[f64; 3]],
+) -> Vec<Ride> {
+    let ride = |(p, anchor): (&SurfacePoint, &[f64; 3])| {
         let (a, b) = (rest.frame(mesh, topology, p), now.frame(mesh, topology, p));
         // Columns of the rotation that takes frame a to frame b.
         let turned = |v: Vec3| b.n * a.n.dot(&v) + b.du * a.du.dot(&v) + b.dv * a.dv.dot(&v);
         let rotation = quaternion([turned(Vec3::x()), turned(Vec3::y()), turned(Vec3::z())]);
-        Ride { position: b.origin.into(), rotation }
+        Ride { position: (b.origin + turned(Vec3::from(*anchor) - a.origin)).into(), rotation }
     };
-    root.par_iter().map(ride).collect()
+    root.par_iter().zip(anchor).map(ride).collect()
+}
+
+/// Moves hairs as they are with their roots. `points` are relative to `origin`, before and after; `anchor` is where the
+/// roots are at rest.
+pub fn carry(offsets: &Offsets, origin: [f64; 3], anchor: &[[f64; 3]], rides: &[Ride], points: &mut [[f32; 3]]) {
+    let origin = Vec3::from(origin);
+    for (h, (anchor, ride)) in anchor.iter().zip(rides).enumerate() {
+        let [x, y, z, w] = ride.rotation;
+        let turn = UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z));
+        for p in &mut points[offsets.range(h)] {
+            let from_root = Vec3::from(p.map(f64::from)) + origin - Vec3::from(*anchor);
+            let q = turn * from_root + Vec3::from(ride.position) - origin;
+            *p = [q.x as f32, q.y as f32, q.z as f32];
+        }
+    }
 }
 
 /// Unit quaternion of a rotation given by its columns, with square roots only (the method of S. W. Shepperd, "Quaternion
@@ -121,14 +144,25 @@ mod tests {
                 RigidTransform { rotation: turn(axis, angle), translation: [1.0, 2.0, 3.0], pivot: [0.0, 1.0, 0.0] };
             let moved: Vec<[f64; 3]> = mesh.position.iter().map(|p| t.apply(Vec3::from(*p)).into()).collect();
             let now = Pose::new(&mesh, &topology, moved);
-            for (ride, p) in rides(&mesh, &topology, &rest, &now, &root).iter().zip(&root) {
+            // Beside the skin.
+            let anchor: Vec<[f64; 3]> = root
+                .iter()
+                .map(|p| (rest.frame(&mesh, &topology, p).origin + Vec3::new(0.1, -0.2, 0.3)).into())
+                .collect();
+            let found = rides(&mesh, &topology, &rest, &now, &root, &anchor);
+            for (ride, a) in found.iter().zip(&anchor) {
                 let dot: f64 = (0..4).map(|x| ride.rotation[x] * t.rotation[x]).sum();
                 assert!(dot.abs() > 1.0 - 1e-11 && ride.rotation[3] >= 0.0, "{ride:?} {t:?}");
-                let at = t.apply(rest.frame(&mesh, &topology, p).origin);
-                assert!((Vec3::from(ride.position) - at).norm() < 1e-12);
+                assert!((Vec3::from(ride.position) - t.apply(Vec3::from(*a))).norm() < 1e-12);
             }
+            let offsets = Offsets::uniform(root.len(), 1);
+            let mut points: Vec<[f32; 3]> = anchor.iter().map(|a| a.map(|x| x as f32)).collect();
+            carry(&offsets, [0.0; 3], &anchor, &found, &mut points);
+            let near =
+                |(p, r): (&[f32; 3], &Ride)| (Vec3::from(p.map(f64::from)) - Vec3::from(r.position)).norm() < 1e-5;
+            assert!(points.iter().zip(&found).all(near));
         }
-        let still = rides(&mesh, &topology, &rest, &rest, &root);
+        let still = rides(&mesh, &topology, &rest, &rest, &root, &vec![[0.0; 3]; root.len()]);
         assert!(still.iter().all(|r| (r.rotation[3] - 1.0).abs() < 1e-12));
     }
 

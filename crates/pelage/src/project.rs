@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::cache::FileHashes;
-use crate::config::{Document, Feature, GroomFile, SEGMENTS, ShotFile, Target};
+use crate::config::{BodyMesh, Document, Feature, GroomFile, Material, MeshShape, SEGMENTS, ShotFile, Target};
 use crate::format::csv;
 use pelage_geom::RigidMotion;
 use pelage_geom::motion::RigidTransform;
@@ -16,6 +16,16 @@ const FARTHEST: f64 = 1e18;
 /// rest pose comes to follow the skin. Half as many show that way in the first frames; twice as many cost as much as half
 /// a second of film more.
 const PREROLL: u32 = 12;
+
+/// The one layer of hair from a curves file: what the file does not say.
+const CURVES_GROOM: &str = r#"
+[control]
+placement = { per_cm2 = 0 }
+[[layer]]
+name = "hair"
+density = { value = 0 }
+length = { value = 0 }
+"#;
 
 type Frames = BTreeMap<i32, SkinAt>;
 
@@ -67,21 +77,36 @@ impl SkinMotion {
     }
 }
 
+/// A mesh that hair can't enter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyFile {
+    /// The mesh.
+    pub file: InputFile,
+    /// What stands for it.
+    pub shape: MeshShape,
+    /// Its motion, if it moves.
+    pub motion: Option<SkinMotion>,
+}
+
 /// A shot with its input files.
 #[derive(Debug)]
 pub struct Project {
     /// The shot file.
     pub shot: Document<ShotFile>,
-    /// The groom file.
+    /// The groom file; for hair from a curves file one that has a layer of defaults.
     pub groom: Document<GroomFile>,
-    /// The rest pose.
-    pub rest: InputFile,
+    /// The rest pose of the skin, if there is one.
+    pub rest: Option<InputFile>,
+    /// Curves that are the hair, instead of a groom.
+    pub curves: Option<InputFile>,
     /// Curves that control hairs are drawn as, if they are.
     pub drawn: Option<InputFile>,
     /// The skin at every frame of the shot.
     pub frames: BTreeMap<i32, SkinAt>,
     /// The skin at frames of the pre-roll that a sequence has files for.
     pub before: BTreeMap<i32, SkinAt>,
+    /// Meshes besides the skin that hair can't enter.
+    pub bodies: Vec<BodyFile>,
     /// The motion of a skin that moves as a whole.
     pub motion: Option<SkinMotion>,
     /// Every map, by the path written in the groom file: UDIM number (0 without tiles) and file.
@@ -100,21 +125,30 @@ impl Project {
                 return Err(shot.error(key, what, "name a folder; it is made if it is absent").into());
             }
         }
-        let groom_path = shot.resolve(&shot.value.groom.file);
-        if !groom_path.is_file() {
-            return Err(missing(&shot, "groom.file", &groom_path).into());
-        }
-        let groom: Document<GroomFile> = Document::read(&groom_path)?;
-        groom.check()?;
+        let groom = match &shot.value.groom.file {
+            Some(file) => {
+                let path = shot.resolve(file);
+                if !path.is_file() {
+                    return Err(missing(&shot, "groom.file", &path).into());
+                }
+                let groom: Document<GroomFile> = Document::read(&path)?;
+                groom.check()?;
+                groom
+            }
+            None => Document::parse(&shot.path, CURVES_GROOM.to_owned())?,
+        };
         let mut hashes = FileHashes::open(&shot.resolve(&shot.value.cache.dir));
         let base = shot.path.parent().unwrap_or(Path::new("")).to_path_buf();
         let simulated =
             groom.value.layer.iter().any(|l| l.simulate.unwrap_or(shot.value.simulate.target) != Target::Off);
         let preroll = if simulated { preroll(&shot.value) } else { 0 };
         let mut find = Finder { base, hashes: &mut hashes, preroll };
-        let rest = find.file(&shot, "skin.rest", &shot.value.skin.rest)?;
+        let rest = shot.value.skin.as_ref().map(|s| find.file(&shot, "skin.rest", &s.rest)).transpose()?;
+        let curves = shot.value.groom.curves.as_ref();
+        let curves = curves.map(|c| find.file(&shot, "groom.curves", c)).transpose()?;
         let motion = find.motion(&shot)?;
         let [frames, before] = find.frames(&shot, motion.as_ref())?;
+        let bodies = if simulated { find.bodies(&shot)? } else { Vec::new() };
         let drawn = groom.value.control.placement.curves.as_ref();
         let drawn = drawn.map(|p| find.file(&groom, "control.placement.curves", p)).transpose()?;
         let mut maps = BTreeMap::new();
@@ -125,7 +159,7 @@ impl Project {
             }
         }
         hashes.save();
-        Ok(Project { shot, groom, rest, drawn, frames, before, motion, maps })
+        Ok(Project { shot, groom, rest, curves, bodies, drawn, frames, before, motion, maps })
     }
 
     /// Folder of the shot's outputs.
@@ -185,9 +219,22 @@ impl Project {
         }
     }
 
-    /// Segments of a simulated hair.
+    /// Segments of a simulated hair of a groom.
     pub fn segments(&self) -> usize {
         self.shot.value.simulate.segments.unwrap_or(SEGMENTS)
+    }
+
+    /// True if simulated hair starts in equilibrium under gravity.
+    pub fn sag_free(&self) -> bool {
+        self.shot.value.simulate.sag_free.unwrap_or(self.curves.is_none())
+    }
+
+    /// What the hair of a layer is made of, and the key that says so.
+    pub fn material(&self, i: usize) -> (String, Material) {
+        match (&self.curves, &self.shot.value.simulate.material) {
+            (None, _) => (format!("layer[{i}].material"), self.groom.value.layer[i].material.clone()),
+            (Some(_), own) => ("simulate.material".to_owned(), own.clone().unwrap_or_default()),
+        }
     }
 
     /// A path for people: relative to the shot file's folder where it lies below it.
@@ -198,7 +245,7 @@ impl Project {
 
 /// Frames that are simulated before the first.
 pub fn preroll(shot: &ShotFile) -> u32 {
-    shot.shot.preroll.unwrap_or(PREROLL)
+    shot.shot.preroll.unwrap_or(if shot.skin.is_some() { PREROLL } else { 0 })
 }
 
 fn label(base: &Path, path: &Path) -> String {
@@ -268,17 +315,44 @@ impl Finder<'_> {
     }
 
     fn motion(&mut self, doc: &Document<ShotFile>) -> Result<Option<SkinMotion>, Error> {
-        let (skin, shot) = (&doc.value.skin, &doc.value.shot);
-        let Some(path) = &skin.motion else { return Ok(None) };
-        let file = self.file(doc, "skin.motion", path)?;
+        let groom = &doc.value.groom;
+        let (path, start, pivot, key) = match &doc.value.skin {
+            Some(skin) => (&skin.motion, skin.motion_start, skin.pivot, "skin.motion"),
+            None => (&groom.motion, groom.motion_start, groom.pivot, "groom.motion"),
+        };
+        path.as_ref().map(|path| self.table(doc, key, path, start, pivot)).transpose()
+    }
+
+    fn table(
+        &mut self,
+        doc: &Document<ShotFile>,
+        key: &str,
+        path: &Path,
+        start: Option<f64>,
+        pivot: [f64; 3],
+    ) -> Result<SkinMotion, Error> {
+        let shot = &doc.value.shot;
+        let file = self.file(doc, key, path)?;
         let motion = csv::read_motion(&file.path, shot.meters_per_unit, shot.fps)?;
-        let start = skin.motion_start.unwrap_or(f64::from(shot.frames[0]));
-        Ok(Some(SkinMotion { file, motion, start, pivot: skin.pivot, fps: shot.fps }))
+        let start = start.unwrap_or(f64::from(shot.frames[0]));
+        Ok(SkinMotion { file, motion, start, pivot, fps: shot.fps })
+    }
+
+    fn bodies(&mut self, doc: &Document<ShotFile>) -> Result<Vec<BodyFile>, Error> {
+        let meshes = doc.value.simulate.body.mesh.iter().enumerate();
+        let body = |(i, m): (usize, &BodyMesh)| {
+            let key = |name: &str| format!("simulate.body.mesh[{i}].{name}");
+            let file = self.file(doc, &key("file"), &m.file)?;
+            let path = m.motion.as_ref();
+            let motion = path.map(|p| self.table(doc, &key("motion"), p, m.motion_start, m.pivot)).transpose()?;
+            Ok(BodyFile { file, shape: m.shape, motion })
+        };
+        meshes.map(body).collect()
     }
 
     /// The skin at every frame of the shot, and at those of the pre-roll that there are files for.
     fn frames(&mut self, doc: &Document<ShotFile>, motion: Option<&SkinMotion>) -> Result<[Frames; 2], Error> {
-        let (skin, shot) = (&doc.value.skin, &doc.value.shot);
+        let shot = &doc.value.shot;
         let range = shot.frames[0]..=shot.frames[1];
         if let Some(m) = motion {
             let near = |t: &RigidTransform| t.translation.iter().chain(&t.pivot).all(|x| x.abs() <= FARTHEST);
@@ -292,7 +366,7 @@ impl Finder<'_> {
             };
             return Ok([range.map(at).collect::<Result<_, Error>>()?, Frames::new()]);
         }
-        let Some(pattern) = &skin.frames else {
+        let Some(pattern) = doc.value.skin.as_ref().and_then(|s| s.frames.as_ref()) else {
             return Ok([range.map(|f| (f, SkinAt::Rest)).collect(), Frames::new()]);
         };
         let pattern = doc.resolve(pattern);

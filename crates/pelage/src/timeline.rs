@@ -55,10 +55,11 @@ impl<'a> Timeline<'a> {
         ((i64::from(frame) - self.first) / self.checkpoint) as u32
     }
 
-    /// Frames that are simulated in a stretch, pre-roll included. Each ends a span that begins a frame before it.
+    /// Frames that are simulated in a stretch, pre-roll included. Each ends a span that begins a frame before it. Without
+    /// pre-roll the first frame is where it starts.
     pub fn simulated(&self, k: u32) -> RangeInclusive<i64> {
         let frames = self.stretch(k);
-        if k == 0 && self.preroll > 0 { self.start() + 1..=*frames.end() } else { frames }
+        if k == 0 { self.start() + 1..=*frames.end() } else { frames }
     }
 
     /// Seconds at a frame number. They do not depend on where the shot begins.
@@ -90,7 +91,8 @@ impl<'a> Timeline<'a> {
     pub fn rigid(&self, arrival: i64, frame: f64) -> Option<RigidTransform> {
         let Some(m) = &self.project.motion else {
             let still = RigidTransform { rotation: [0.0, 0.0, 0.0, 1.0], translation: [0.0; 3], pivot: [0.0; 3] };
-            return self.project.shot.value.skin.frames.is_none().then_some(still);
+            let deforms = self.project.shot.value.skin.as_ref().is_some_and(|s| s.frames.is_some());
+            return (!deforms).then_some(still);
         };
         let arrival = arrival as f64;
         if frame >= arrival {

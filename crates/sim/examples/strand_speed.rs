@@ -63,5 +63,7 @@ fn measure(count: usize, segments: usize, wide: bool) {
         solve = solve.min(t / r.particle_solves as f64);
         ratio = r.particle_solves as f64 / r.particle_steps as f64;
     }
-    println!("{count} hairs x {segments}, wide {wide}: {best:.1} ns a node and step, {solve:.1} a node and solve; {ratio:.2} solves a step");
+    println!(
+        "{count} hairs x {segments}, wide {wide}: {best:.1} ns a node and step, {solve:.1} a node and solve; {ratio:.2} solves a step"
+    );
 }

@@ -69,13 +69,7 @@ fn is_free(g: &Group, i: usize, l: usize) -> bool {
 }
 
 /// Finds the contacts of some lanes at the nodes' present positions; false if there are none.
-pub fn find(
-    g: &Group,
-    body: &Instant<'_, '_>,
-    lanes: [bool; LANES],
-    h: f64,
-    contact: &mut [Contact],
-) -> bool {
+pub fn find(g: &Group, body: &Instant<'_, '_>, lanes: [bool; LANES], h: f64, contact: &mut [Contact]) -> bool {
     let mut any = false;
     for i in 0..g.node.len() {
         for l in 0..LANES {

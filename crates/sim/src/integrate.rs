@@ -52,6 +52,13 @@ pub struct Work {
     straight: Scratch<3, 9>,
 }
 
+impl Work {
+    /// Forgets the group that was moved before: what a strand does must not depend on which thread takes it.
+    pub fn forget(&mut self) {
+        self.contact.clear();
+    }
+}
+
 /// How steps are taken.
 #[derive(Clone, Copy, Debug)]
 pub struct Method {
@@ -228,9 +235,7 @@ fn step<A: Around>(
     let (mut converged, mut touched) = (lanes, false);
     let start = held_positions(g);
     let blowing = around.air(g, lanes, at.start, &mut work.air);
-    for (second, fraction, since) in
-        [(false, at.start + GAMMA * at.length, h), (true, at.start + at.length, dt - h)]
-    {
+    for (second, fraction, since) in [(false, at.start + GAMMA * at.length, h), (true, at.start + at.length, dt - h)] {
         let gravity = around.gravity(fraction);
         let rest = dt - h;
         let Work { y, base, from, .. } = work;

@@ -12,8 +12,8 @@ pub mod lanes;
 pub mod rod;
 pub mod settle;
 pub mod simulation;
-pub mod stage;
 pub mod springs;
+pub mod stage;
 pub mod wind;
 
 pub use body::{

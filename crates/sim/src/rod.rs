@@ -363,7 +363,16 @@ pub fn sweep<L: Lanes, const D: usize, const ROWS: usize>(
             let middle = add3(here.t, next.t);
             let tangent = scale3(middle, L::splat(1.0) / dot(middle, middle).max(L::splat(1e-30)).sqrt());
             open_turn::<L, D, ROWS>(
-                i + 1, nodes, elastic, turned, tangent, motion, stage, &mut window, rhs, spin_scale,
+                i + 1,
+                nodes,
+                elastic,
+                turned,
+                tangent,
+                motion,
+                stage,
+                &mut window,
+                rhs,
+                spin_scale,
             );
             add_edge(i, &here, L::load(&nodes[i].length), L::load(&elastic[i].stretch), &mut window, rhs);
             if let Some(e0) = &before {
@@ -441,11 +450,7 @@ fn delta<L: Lanes, const D: usize>(rhs: &[Pack; D]) -> L3<L> {
 fn moved<L: Lanes>(x: L3<L>, d: L3<L>, scale: L) -> L3<L> {
     let zero = L::splat(0.0);
     let to = mul_add3(d, scale, x);
-    [
-        L::if_gt(scale, zero, to[0], x[0]),
-        L::if_gt(scale, zero, to[1], x[1]),
-        L::if_gt(scale, zero, to[2], x[2]),
-    ]
+    [L::if_gt(scale, zero, to[0], x[0]), L::if_gt(scale, zero, to[1], x[1]), L::if_gt(scale, zero, to[2], x[2])]
 }
 
 /// Moves the nodes and frames by the solution, no segment by more than [`LARGEST_TURN`]; returns the square of the

@@ -5,13 +5,13 @@
 //! tangent is taken (by differences of the exact gradient, several nodes at a time that do not see each other), factored,
 //! and the signs of its pivots tell (Sylvester's law of inertia). A strand that can't stand is stiffened until it can.
 
+use crate::Vec3;
 use crate::band::{self, Column, Panel, RING, Window};
 use crate::group::{Group, Section, Strand};
 use crate::lanes::{self, Kernel, LANES, Lanes, Pack, Width};
 use crate::rod::{self, Damping, Scratch};
 use crate::simulation::{End, Settings};
 use crate::stage::Stage;
-use crate::Vec3;
 
 /// Stiffness doubles at most this often: 64 times.
 const DOUBLINGS: u32 = 6;

@@ -3,10 +3,10 @@
 use crate::contact::{self, Keep};
 use crate::drag;
 use crate::group::{Group, Strand};
-use crate::settle;
 use crate::integrate::{self, Around, Done, Interval, Method, Work};
 use crate::lanes::{LANES, Pack, Width};
 use crate::rod::{self, Damping};
+use crate::settle;
 use crate::stage::{Air, Contact};
 use crate::wind::Surface;
 use crate::{Body, Motion, Rigid, Vec3, Wind};
@@ -379,7 +379,11 @@ impl Simulation {
             particles: pick.len() as u64,
             bytes: (nodes * (size_of::<crate::stage::Node>() + size_of::<crate::stage::Motion>())) as u64
                 + (nodes * size_of::<rod::Elastic>()) as u64,
-            stiffened: figures.iter().flat_map(|f| &f.stiffened).map(|&(s, factor)| StiffenedStrand { id: hairs.id[s], factor }).collect(),
+            stiffened: figures
+                .iter()
+                .flat_map(|f| &f.stiffened)
+                .map(|&(s, factor)| StiffenedStrand { id: hairs.id[s], factor })
+                .collect(),
             rigid: rider.iter().map(|r| hairs.id[r.index]).collect(),
             largest_hinge: figures.iter().map(|f| f.hinge).fold(0.0, f64::max),
             largest_gamma: figures.iter().map(|f| f.gamma).fold(0.0, f64::max),
@@ -539,9 +543,7 @@ impl Simulation {
     /// Takes over a saved state.
     pub fn restore(&mut self, state: &[u8]) -> Result<(), SimError> {
         let values: Vec<f64> = state.chunks_exact(8).map(bytemuck::pod_read_unaligned).collect();
-        let size = |p: &Option<(u32, u8)>| {
-            7 + p.map_or(0, |(g, l)| 2 + 14 * self.group[g as usize].count[l as usize])
-        };
+        let size = |p: &Option<(u32, u8)>| 7 + p.map_or(0, |(g, l)| 2 + 14 * self.group[g as usize].count[l as usize]);
         if state.len() != 8 * self.place.iter().map(size).sum::<usize>() {
             return Err(SimError::State("its length differs"));
         }
@@ -596,6 +598,7 @@ fn sample(points: Vec<Vec3>, segments: Option<usize>) -> Vec<Vec3> {
 /// Moves a group through a span.
 fn move_group(g: &mut Group, scene: &Scene<'_>, method: &Method, steps: u32, work: &mut Work, done: &mut Moved) {
     let saved = g.motion.clone();
+    work.forget();
     if g.keep.most.is_empty() {
         g.keep = Keep::new(g, &scene.span.body.at(0.0), scene.settings.offset);
     }

@@ -3,8 +3,8 @@
 mod common;
 
 use common::{GRAVITY, Shot, Vec3, turned};
-use pelage_geom::{Bvh, Topology, shapes};
 use pelage_geom::Mesh;
+use pelage_geom::{Bvh, Topology, shapes};
 use pelage_sim::{Body, Exact, Field, FieldSettings, Part, Settings, Shape};
 
 /// A ball as a mesh with its field.
@@ -18,8 +18,7 @@ fn ball(radius: f64) -> Ball {
     let mesh = shapes::cube_sphere(48, radius);
     let topology = Topology::new(&mesh);
     let bvh = Bvh::build(&mesh.position, &mesh.triangle, &topology);
-    let field =
-        Field::build(&mesh.position, &mesh.triangle, &topology, &bvh, &FieldSettings::default(), None);
+    let field = Field::build(&mesh.position, &mesh.triangle, &topology, &bvh, &FieldSettings::default(), None);
     Ball { mesh, bvh, field }
 }
 
@@ -79,8 +78,14 @@ fn hair_on_a_shaking_ball_stays_outside() {
             if frame % 6 == 5 {
                 println!(
                     "speed {speed} frame {frame}: deepest {:.4} mm corrected {} strain {:.1e} steps {} sub {} shortest {:.1e} solves/step {:.2} held {} ns/node/step {:.0}",
-                    deepest * 1e3, shot.last.corrected, shot.last.largest_strain, shot.last.steps, shot.last.subdivided,
-                    shot.last.shortest_step, shot.last.particle_solves as f64 / shot.last.particle_steps as f64, shot.last.held.len(),
+                    deepest * 1e3,
+                    shot.last.corrected,
+                    shot.last.largest_strain,
+                    shot.last.steps,
+                    shot.last.subdivided,
+                    shot.last.shortest_step,
+                    shot.last.particle_solves as f64 / shot.last.particle_steps as f64,
+                    shot.last.held.len(),
                     t * 2e9 / shot.last.particle_steps as f64
                 );
             }

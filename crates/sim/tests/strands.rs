@@ -56,7 +56,10 @@ fn released(segments: usize, steps: u32, gamma: f64, tolerance: f64) -> Vec<[f64
         tips.push(p[segments]);
         println!(
             "{segments} segments, {steps} steps: tip {:?} strain {:.1e} solves per node and stage {:.2} subdivided {}",
-            p[segments], r.largest_strain, r.particle_solves as f64 / r.particle_steps as f64 / 2.0, r.subdivided
+            p[segments],
+            r.largest_strain,
+            r.particle_solves as f64 / r.particle_steps as f64 / 2.0,
+            r.subdivided
         );
     }
     tips
@@ -122,8 +125,17 @@ fn a_groomed_pose_stays() {
             sim.advance(&span, &|_| true).unwrap();
         }
         let p = sim.positions();
-        let drift = p.iter().zip(&points).map(|(a, b)| (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>().sqrt()).fold(0.0, f64::max);
-        println!("length {length} direction {direction:?} curl {curl}: drift {:.1e} L, gamma {:.1}, stiffened {:?}", drift / length, started.largest_gamma, started.stiffened);
+        let drift = p
+            .iter()
+            .zip(&points)
+            .map(|(a, b)| (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>().sqrt())
+            .fold(0.0, f64::max);
+        println!(
+            "length {length} direction {direction:?} curl {curl}: drift {:.1e} L, gamma {:.1}, stiffened {:?}",
+            drift / length,
+            started.largest_gamma,
+            started.stiffened
+        );
     }
 }
 
@@ -134,7 +146,11 @@ fn a_violent_shake_stays_bounded_at_every_step() {
     for fps in [1667.0, 480.0, 120.0, 24.0, 12.0, 1.0] {
         let points = human(0.2, [0.0, -1.0, 0.0], 0.0, 50);
         let offsets = Offsets::uniform(1, points.len());
-        let settings = Settings { material: Material { drag_factor: 0.0, ..Material::default() }, substeps: Some(1), ..Settings::default() };
+        let settings = Settings {
+            material: Material { drag_factor: 0.0, ..Material::default() },
+            substeps: Some(1),
+            ..Settings::default()
+        };
         let g = [0.0, -9.81, 0.0];
         let hairs = Hairs { offsets: &offsets, position: &points, id: &[1] };
         let (mut sim, _) = Simulation::new(&hairs, &settings, g).unwrap();
@@ -148,17 +164,28 @@ fn a_violent_shake_stays_bounded_at_every_step() {
                 ..Rigid::default()
             };
             let span = Span {
-                seconds: 1.0 / fps, time: start, motion: &motion, roots: [&root, &root], tips: None, body: &body,
-                gravity: [g, g], wind: None,
+                seconds: 1.0 / fps,
+                time: start,
+                motion: &motion,
+                roots: [&root, &root],
+                tips: None,
+                body: &body,
+                gravity: [g, g],
+                wind: None,
             };
             let r = sim.advance(&span, &|_| true).unwrap();
             strain = strain.max(r.largest_strain);
             held += r.held.len();
             solves += r.particle_solves;
             steps += r.particle_steps;
-            fast = sim.velocities().iter().map(|v| (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()).fold(fast, f64::max);
+            fast =
+                sim.velocities().iter().map(|v| (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()).fold(fast, f64::max);
         }
-        println!("fps {fps}: strain {strain:.1e} fastest {fast:.1} m/s solves/step {:.2} steps {} held {held}", solves as f64 / steps as f64, steps / 52);
+        println!(
+            "fps {fps}: strain {strain:.1e} fastest {fast:.1} m/s solves/step {:.2} steps {} held {held}",
+            solves as f64 / steps as f64,
+            steps / 52
+        );
         assert!(strain <= 0.01 && held == 0);
     }
 }

@@ -1,7 +1,7 @@
 //! The shot file, `pipeline.toml`.
 
 use super::document::{ConfigError, Document, exactly};
-use super::simulate::Simulate;
+use super::simulate::{Simulate, Target};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::path::PathBuf;
@@ -12,9 +12,9 @@ use std::path::PathBuf;
 pub struct ShotFile {
     /// What the shot is.
     pub shot: Shot,
-    /// The surface that hair grows on.
-    pub skin: Skin,
-    /// The look.
+    /// The surface that hair grows on. Hair from a curves file needs none.
+    pub skin: Option<Skin>,
+    /// The look: a groom, or hair from a curves file.
     pub groom: GroomRef,
     /// How hair is simulated.
     #[serde(default)]
@@ -46,7 +46,7 @@ pub struct Shot {
     /// The axis that points up. Default: "y".
     #[serde(default)]
     pub up: UpAxis,
-    /// Frames that are simulated before the first one, from the rest pose on. Default: 12.
+    /// Frames that are simulated before the first one, from the rest pose on. Default: 12; 0 without a skin.
     pub preroll: Option<u32>,
 }
 
@@ -78,12 +78,21 @@ pub struct Skin {
     pub frames: Option<PathBuf>,
 }
 
-/// The look.
+/// Where hair comes from: exactly one of `file` and `curves`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GroomRef {
     /// The groom file.
-    pub file: PathBuf,
+    pub file: Option<PathBuf>,
+    /// Curves (USD, PLY or .hair) that are the hair, instead of a groom. Bound to the skin if there is one.
+    pub curves: Option<PathBuf>,
+    /// Curves without a skin: CSV of a rigid motion of their roots, as for `skin.motion`. Default: they stay.
+    pub motion: Option<PathBuf>,
+    /// The frame at which that motion's time is 0. Default: the shot's first frame.
+    pub motion_start: Option<f64>,
+    /// Point in scene units that the motion's rotation leaves in place. Default: the origin.
+    #[serde(default, deserialize_with = "exactly")]
+    pub pivot: [f64; 3],
 }
 
 /// Files to write.
@@ -177,22 +186,7 @@ impl Document<ShotFile> {
         if s.shot.preroll.is_some_and(|n| n > 100_000) {
             return bad("shot.preroll", "is more than 100000 frames", "12 is usual");
         }
-        if s.skin.motion.is_some() && s.skin.frames.is_some() {
-            return bad("skin.motion", "can't go together with skin.frames", "keep one of the two");
-        }
-        if s.skin.motion_start.is_some_and(|x| !x.is_finite()) {
-            return bad(
-                "skin.motion_start",
-                "must be a finite number",
-                "it is the frame at which the motion's time is 0",
-            );
-        }
-        if s.skin.frames.as_ref().is_some_and(|f| f.to_string_lossy().matches('#').count() == 0) {
-            return bad("skin.frames", "has no # for the frame number", "write for example \"anim/bust.####.ply\"");
-        }
-        if !s.skin.pivot.iter().all(|x| x.is_finite()) {
-            return bad("skin.pivot", "must be three finite numbers", "");
-        }
+        self.check_hair()?;
         if s.export.formats.iter().enumerate().any(|(i, f)| s.export.formats[..i].contains(f)) {
             return bad("export.formats", "names a format twice", "");
         }
@@ -213,5 +207,57 @@ impl Document<ShotFile> {
             return bad("preview.sheet", "must be between 1 and 100 pictures", "");
         }
         self.check_simulate()
+    }
+
+    /// Checks `[skin]` and `[groom]`.
+    fn check_hair(&self) -> Result<(), ConfigError> {
+        let s = &self.value;
+        let bad = |key: &str, what: &str, help: &str| Err(self.error(key, what, help));
+        if let Some(skin) = &s.skin {
+            if skin.motion.is_some() && skin.frames.is_some() {
+                return bad("skin.motion", "can't go together with skin.frames", "keep one of the two");
+            }
+            self.check_motion("skin", skin.motion_start, skin.pivot)?;
+            if skin.frames.as_ref().is_some_and(|f| f.to_string_lossy().matches('#').count() == 0) {
+                return bad("skin.frames", "has no # for the frame number", "write for example \"anim/bust.####.ply\"");
+            }
+        }
+        let g = &s.groom;
+        self.check_motion("groom", g.motion_start, g.pivot)?;
+        match (&g.file, &g.curves) {
+            (Some(_), Some(_)) => {
+                return bad("groom.curves", "can't go together with groom.file", "keep one of the two");
+            }
+            (None, None) => return bad("groom", "does not say where hair comes from", "give `file` or `curves`"),
+            (Some(_), None) if s.skin.is_none() => {
+                return bad("groom.file", "a groom needs a skin", "add [skin] with rest = \"mesh.ply\"");
+            }
+            _ => {}
+        }
+        if g.motion.is_some() && (s.skin.is_some() || g.curves.is_none()) {
+            return bad("groom.motion", "moves curves without a skin only", "write skin.motion");
+        }
+        if s.simulate.material.is_some() && g.curves.is_none() {
+            return bad(
+                "simulate.material",
+                "is for hair from a curves file",
+                "write layer.material in the groom file",
+            );
+        }
+        if s.simulate.target == Target::ControlHairs && g.curves.is_some() {
+            return bad("simulate.target", "hair from a curves file has no control hairs", "write \"every-hair\"");
+        }
+        Ok(())
+    }
+
+    pub(super) fn check_motion(&self, table: &str, start: Option<f64>, pivot: [f64; 3]) -> Result<(), ConfigError> {
+        if start.is_some_and(|x| !x.is_finite()) {
+            let help = "it is the frame at which the motion's time is 0";
+            return Err(self.error(&format!("{table}.motion_start"), "must be a finite number", help));
+        }
+        if !pivot.iter().all(|x| x.is_finite()) {
+            return Err(self.error(&format!("{table}.pivot"), "must be three finite numbers", ""));
+        }
+        Ok(())
     }
 }

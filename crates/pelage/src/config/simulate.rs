@@ -22,11 +22,12 @@ pub struct Simulate {
     /// Model of a strand. Default: "rod".
     pub model: StrandModel,
     /// Segments of a simulated hair, equal in length; hairs simulated one by one are exported with one point more.
-    /// Default: 25.
+    /// Default: 25; for hair from a curves file its points as they are.
     pub segments: Option<usize>,
     /// Steps in a frame. Default: chosen from the motion of the skin.
     pub substeps: Option<u32>,
-    /// Start in equilibrium under gravity, so that the groomed pose stands as it was combed. Default: true.
+    /// Start in equilibrium under gravity, so that the hair stands as it was combed; false: its shape is the natural,
+    /// unloaded one. Default: true; false for hair from a curves file.
     pub sag_free: Option<bool>,
     /// Largest strain that is left in a segment: 0.01 is one percent. Default: 0.01.
     pub strain_limit: f64,
@@ -45,6 +46,10 @@ pub struct Simulate {
     pub gravity: Keyed<Amount>,
     /// The wind. Default: none.
     pub wind: Option<WindSettings>,
+    /// What hair can't enter.
+    pub body: BodySettings,
+    /// What hair from a curves file is made of. Layers of a groom say it themselves.
+    pub material: Option<Material>,
 }
 
 impl Default for Simulate {
@@ -63,6 +68,8 @@ impl Default for Simulate {
             checkpoint: CHECKPOINT,
             gravity: Keyed::constant(Amount::Number(9.81)),
             wind: None,
+            body: BodySettings::default(),
+            material: None,
         }
     }
 }
@@ -104,12 +111,106 @@ pub enum StrandModel {
     Paper,
 }
 
-/// The wind.
+/// The wind. Velocities and strengths may have key frames, sizes and times are of the shot.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WindSettings {
     /// Mean velocity along the scene's axes, m/s: three numbers, or key frames `[{ frame, value }]`.
     pub velocity: Keyed<Vector>,
+    /// Largest change of the mean wind in a gust, as a fraction of it: a number, or key frames. Default: 0.
+    #[serde(default = "nothing")]
+    pub gust: Keyed<f64>,
+    /// Time from one gust to the next, seconds. Default: 2.
+    pub gust_period: Option<f64>,
+    /// Turbulence: root mean square of its speed, m/s: a number, or key frames. Default: 0.
+    #[serde(default = "nothing")]
+    pub turbulence: Keyed<f64>,
+    /// Size of the largest eddies, metres. Default: 0.2.
+    pub turbulence_size: Option<f64>,
+    /// Time in which the largest eddies change, seconds. Default: 1.
+    pub turbulence_period: Option<f64>,
+    /// Thickness of the layer of air at the body in which wind toward it fades, metres. Default: 0.02.
+    pub boundary: Option<f64>,
+    /// Names the wind's random numbers. Default: 0.
+    #[serde(default)]
+    pub seed: u32,
+}
+
+fn nothing() -> Keyed<f64> {
+    Keyed::constant(0.0)
+}
+
+impl WindSettings {
+    /// The wind around a frame number, in a shot of so many frames per second.
+    pub fn at(&self, frame: f64, fps: f64) -> pelage_sim::Wind {
+        let d = pelage_sim::Wind::default();
+        let velocity = self.velocity.vectors();
+        let keys: Vec<(f64, [f64; 3])> = velocity.0.iter().map(|k| (k.frame / fps, k.value)).collect();
+        pelage_sim::Wind {
+            velocity: velocity.at(frame),
+            drift: (keys.len() > 1).then(|| pelage_sim::wind::drift(&keys, frame / fps)),
+            gust: self.gust.at(frame),
+            gust_period: self.gust_period.unwrap_or(d.gust_period),
+            turbulence: self.turbulence.at(frame),
+            turbulence_size: self.turbulence_size.unwrap_or(d.turbulence_size),
+            turbulence_period: self.turbulence_period.unwrap_or(d.turbulence_period),
+            boundary: self.boundary.unwrap_or(d.boundary),
+            seed: u64::from(self.seed),
+        }
+    }
+}
+
+/// What hair can't enter.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct BodySettings {
+    /// The skin. Default: true.
+    pub skin: bool,
+    /// Distance between the samples of distance fields, millimetres. Default: 4.
+    pub voxel: f64,
+    /// Distance outside a surface up to which its field is exact, millimetres. Default: 20.
+    pub outside: f64,
+    /// Distance inside a surface up to which its field is exact, millimetres. Default: 10.
+    pub inside: f64,
+    /// Other meshes.
+    pub mesh: Vec<BodyMesh>,
+}
+
+impl Default for BodySettings {
+    fn default() -> Self {
+        let f = pelage_sim::body::FieldSettings::default();
+        let [voxel, outside, inside] = [f.voxel, f.outside, f.inside].map(|x| x * 1e3);
+        BodySettings { skin: true, voxel, outside, inside, mesh: Vec::new() }
+    }
+}
+
+/// A mesh that hair can't enter.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BodyMesh {
+    /// PLY, scene units.
+    pub file: std::path::PathBuf,
+    /// What stands for it. Default: "field".
+    #[serde(default)]
+    pub shape: MeshShape,
+    /// CSV of its rigid motion, as for `skin.motion`. Default: it stays.
+    pub motion: Option<std::path::PathBuf>,
+    /// The frame at which that motion's time is 0. Default: the shot's first frame.
+    pub motion_start: Option<f64>,
+    /// Point in scene units that the motion's rotation leaves in place. Default: the origin.
+    #[serde(default, deserialize_with = "exactly")]
+    pub pivot: [f64; 3],
+}
+
+/// What stands for a mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum MeshShape {
+    /// A distance field of it.
+    #[default]
+    Field,
+    /// The ellipsoid around its vertices: cheap, for what is about as round.
+    Ellipsoid,
 }
 
 /// Three numbers.
@@ -151,11 +252,27 @@ impl<T> Keyed<T> {
 impl Keyed<[f64; 3]> {
     /// Value at a frame number.
     pub fn at(&self, frame: f64) -> [f64; 3] {
+        let (a, b, f) = self.around(frame);
+        std::array::from_fn(|x| a[x] + (b[x] - a[x]) * f)
+    }
+}
+
+impl Keyed<f64> {
+    /// Value at a frame number.
+    pub fn at(&self, frame: f64) -> f64 {
+        let (a, b, f) = self.around(frame);
+        a + (b - a) * f
+    }
+}
+
+impl<T> Keyed<T> {
+    /// The values around a frame number, and the fraction of the way from the first to the second.
+    fn around(&self, frame: f64) -> (&T, &T, f64) {
         let next = self.0.partition_point(|k| k.frame <= frame);
         let (a, b) = (&self.0[next.saturating_sub(1)], &self.0[next.min(self.0.len() - 1)]);
         let span = b.frame - a.frame;
         let f = if span > 0.0 { ((frame - a.frame) / span).clamp(0.0, 1.0) } else { 0.0 };
-        std::array::from_fn(|x| a.value[x] + (b.value[x] - a.value[x]) * f)
+        (&a.value, &b.value, f)
     }
 }
 
@@ -316,12 +433,34 @@ impl Document<ShotFile> {
         number("offset", s.offset, 0.0, 1e3, "it is in millimetres; 0.5 is usual")?;
         number("teleport", s.teleport, 1e-9, 1e9, "it is in metres; 1 is usual")?;
         number("checkpoint", f64::from(s.checkpoint), 1.0, 1e6, "24 is usual")?;
+        if let Some(material) = &s.material {
+            check_material(self, "simulate.material", material)?;
+        }
         let up = self.value.shot.up;
         self.keys("simulate.gravity", &s.gravity.downward(up), 1e6, "9.81 is the earth's, in m/s2")?;
-        match &s.wind {
-            Some(wind) => self.keys("simulate.wind.velocity", &wind.velocity.vectors(), 1e4, "it is in m/s"),
-            None => Ok(()),
+        self.check_body()?;
+        let Some(wind) = &s.wind else { return Ok(()) };
+        let three = |k: &Keyed<f64>| Keyed(k.0.iter().map(|k| Key { frame: k.frame, value: [k.value; 3] }).collect());
+        self.keys("simulate.wind.velocity", &wind.velocity.vectors(), 1e4, "it is in m/s")?;
+        self.keys("simulate.wind.gust", &three(&wind.gust), 100.0, "0.3 changes the wind by up to 30 %")?;
+        self.keys("simulate.wind.turbulence", &three(&wind.turbulence), 1e4, "it is in m/s")?;
+        let d = pelage_sim::Wind::default();
+        number("wind.gust_period", wind.gust_period.unwrap_or(d.gust_period), 1e-6, 1e6, "it is in seconds")?;
+        number("wind.turbulence_size", wind.turbulence_size.unwrap_or(d.turbulence_size), 1e-6, 1e6, "in metres")?;
+        let period = wind.turbulence_period.unwrap_or(d.turbulence_period);
+        number("wind.turbulence_period", period, 1e-6, 1e6, "it is in seconds")?;
+        number("wind.boundary", wind.boundary.unwrap_or(d.boundary), 0.0, 1e3, "it is in metres")
+    }
+
+    fn check_body(&self) -> Result<(), ConfigError> {
+        let b = &self.value.simulate.body;
+        for (name, x, low) in [("voxel", b.voxel, 1e-3), ("outside", b.outside, 0.0), ("inside", b.inside, 0.0)] {
+            range(self, &format!("simulate.body.{name}"), x, low, 1e6, "it is in millimetres")?;
         }
+        for (i, m) in b.mesh.iter().enumerate() {
+            self.check_motion(&format!("simulate.body.mesh[{i}]"), m.motion_start, m.pivot)?;
+        }
+        Ok(())
     }
 
     fn keys(&self, key: &str, keyed: &Keyed<[f64; 3]>, max: f64, help: &str) -> Result<(), ConfigError> {

@@ -1,106 +1,182 @@
-//! The skin as what hair can't enter: its distance field at the frames of a span.
+//! What hair can't enter: distance fields of the skin and of other meshes.
 
-use super::Skin;
-use pelage_geom::{Bvh, Offsets, Vec3};
-use pelage_sim::{
-    Body, Bounds, Closed, Deforming, Exact, Field, FieldSettings, Flow, Motion, Part, Shape,
-};
+use super::groom;
+use super::run::Runner;
+use crate::Error;
+use crate::config::MeshShape;
+use crate::format::ply;
+use crate::project::SkinMotion;
+use crate::timeline::Timeline;
+use pelage_geom::{Bvh, Mesh, Topology};
+use pelage_sim::body::{Closed, Ellipsoid, Exact, FieldSettings, Flow};
+use pelage_sim::body::{Deforming, Field};
+use pelage_sim::{Body, Part, Rigid, Shape};
+use std::rc::Rc;
 
-/// A skin's surface at one frame, metres.
+/// A mesh with its holes closed, in metres.
 struct Solid {
-    frame: i64,
+    closed: Closed,
+}
+
+/// A solid's surface at one moment.
+struct Surface {
     position: Vec<[f64; 3]>,
     bvh: Bvh,
     field: Field,
 }
 
-/// The skin as a solid, frame after frame.
-pub(super) struct SkinBody {
-    closed: Closed,
-    settings: FieldSettings,
-    /// Farthest that a hair reaches from its root, metres.
-    reach: f64,
-    unit: f64,
-    before: Option<Solid>,
-    now: Option<Solid>,
-    /// Velocities from `before` to `now`, by vertex and in both fields.
-    velocity: Vec<[f64; 3]>,
-    flow: Option<[Flow; 2]>,
+/// A solid that moves as a whole.
+struct RigidSolid {
+    solid: Solid,
+    surface: Surface,
+    ellipsoid: Option<Ellipsoid>,
+    /// Its motion; `None`: that of the skin.
+    motion: Option<Option<SkinMotion>>,
 }
 
-impl SkinBody {
-    /// Of a skin that carries hairs of the given points (metres).
-    pub fn new(skin: &Skin, unit: f64, settings: FieldSettings, offsets: &Offsets, position: &[[f64; 3]]) -> Self {
-        let reach = |h: usize| {
-            let points = &position[offsets.range(h)];
-            points.windows(2).map(|w| (Vec3::from(w[1]) - Vec3::from(w[0])).norm()).sum::<f64>()
-        };
-        SkinBody {
-            closed: Closed::new(&skin.mesh, &skin.topology),
-            settings,
-            reach: (0..offsets.len()).map(reach).fold(0.0, f64::max),
-            unit,
-            before: None,
-            now: None,
-            velocity: Vec::new(),
-            flow: None,
-        }
+/// Everything that hair can't enter in a shot, made once a run.
+pub(super) struct Colliders {
+    settings: FieldSettings,
+    rigid: Vec<RigidSolid>,
+    /// The skin, if it deforms.
+    skin: Option<Solid>,
+}
+
+/// A deforming skin over a span: its surfaces at both ends, and how they move.
+pub(super) struct Moving {
+    seconds: f64,
+    ends: [Rc<End>; 2],
+    flow: [Flow; 2],
+    velocity: Vec<[f64; 3]>,
+}
+
+/// A deforming skin at a frame.
+pub(super) struct End {
+    surface: Surface,
+}
+
+impl Solid {
+    fn new(mesh: &Mesh, topology: &Topology) -> Self {
+        Solid { closed: Closed::new(mesh, topology) }
     }
 
-    /// Edges of holes that were closed, and of those that stay open.
-    pub fn open_edges(&self) -> (usize, usize) {
-        let left = self.closed.topology.counts.open_edges;
-        (self.closed.open_edges - left.min(self.closed.open_edges), left)
-    }
-
-    /// Goes on to a frame, where the skin's vertices are at `position` (scene units) and its roots at `roots` (metres).
-    pub fn go(&mut self, frame: i64, position: &[[f64; 3]], roots: &[[f64; 3]], seconds: f64) {
-        if self.now.as_ref().is_some_and(|s| s.frame == frame) {
-            return;
-        }
-        let solid = self.solid(frame, position, roots);
-        self.before = self.now.replace(solid);
-        let (Some(a), Some(b)) = (&self.before, &self.now) else { return };
-        let speed = |(p, q): (&[f64; 3], &[f64; 3])| std::array::from_fn(|x| (q[x] - p[x]) / seconds);
-        self.velocity = a.position.iter().zip(&b.position).map(speed).collect();
-        let triangle = &self.closed.mesh.triangle;
-        self.flow = Some([&a, &b].map(|s| s.field.flow(triangle, &self.velocity)));
-    }
-
-    fn solid(&self, frame: i64, position: &[[f64; 3]], roots: &[[f64; 3]]) -> Solid {
-        let metres: Vec<[f64; 3]> = position.iter().map(|p| p.map(|x| x * self.unit)).collect();
+    /// The solid with the mesh's vertices at `position`, scene units of `unit` metres.
+    fn at(&self, position: &[[f64; 3]], unit: f64, settings: &FieldSettings) -> Surface {
+        let metres: Vec<[f64; 3]> = position.iter().map(|p| p.map(|x| x * unit)).collect();
         let position = self.closed.extend(&metres);
         let (triangle, topology) = (&self.closed.mesh.triangle, &self.closed.topology);
         let bvh = Bvh::build(&position, triangle, topology);
-        let region = self.region(roots);
-        let field = Field::build(&position, triangle, topology, &bvh, &self.settings, region);
-        Solid { frame, position, bvh, field }
+        let field = Field::build(&position, triangle, topology, &bvh, settings, None);
+        Surface { position, bvh, field }
     }
+}
 
-    /// Where hair can come.
-    fn region(&self, roots: &[[f64; 3]]) -> Option<Bounds> {
-        let mut all = (*roots.first()?, *roots.first()?);
-        for r in roots {
-            for x in 0..3 {
-                all.0[x] = all.0[x].min(r[x]);
-                all.1[x] = all.1[x].max(r[x]);
-            }
+/// What the shot has of bodies.
+pub(super) fn colliders(run: &mut Runner<'_>, deforms: bool) -> Result<Rc<Colliders>, Error> {
+    if let Some(found) = &run.colliders {
+        return Ok(found.clone());
+    }
+    let shot = &run.project.shot.value;
+    let (unit, b) = (shot.shot.meters_per_unit, &shot.simulate.body);
+    let settings = FieldSettings { voxel: b.voxel * 1e-3, outside: b.outside * 1e-3, inside: b.inside * 1e-3 };
+    let mut out = Colliders { settings, rigid: Vec::new(), skin: None };
+    if b.skin && run.project.rest.is_some() {
+        let skin = groom::skin(run)?;
+        let solid = Solid::new(&skin.mesh, &skin.topology);
+        note_holes(run, "the skin", &solid);
+        if deforms {
+            out.skin = Some(solid);
+        } else {
+            let surface = solid.at(&skin.mesh.position, unit, &settings);
+            out.rigid.push(RigidSolid { solid, surface, ellipsoid: None, motion: None });
         }
-        let reach = self.reach + self.settings.outside;
-        Some((all.0.map(|x| x - reach), all.1.map(|x| x + reach)))
+    }
+    for mesh in &run.project.bodies {
+        let read = ply::read_mesh(&mesh.file.path)?;
+        let topology = Topology::new(&read.mesh);
+        let solid = Solid::new(&read.mesh, &topology);
+        note_holes(run, &mesh.file.label, &solid);
+        let surface = solid.at(&read.mesh.position, unit, &settings);
+        let whole = |e: Ellipsoid| e.around(&surface.position);
+        let ellipsoid = match mesh.shape {
+            MeshShape::Field => None,
+            MeshShape::Ellipsoid => Ellipsoid::fit(&surface.position).map(whole),
+        };
+        out.rigid.push(RigidSolid { solid, surface, ellipsoid, motion: Some(mesh.motion.clone()) });
+    }
+    let out = Rc::new(out);
+    run.colliders = Some(out.clone());
+    Ok(out)
+}
+
+fn note_holes(run: &mut Runner<'_>, name: &str, solid: &Solid) {
+    if solid.closed.open_edges > 0 {
+        let left = solid.closed.topology.counts.open_edges;
+        let text =
+            format!("{name}: {} open edges are closed for collisions, {left} stay open", solid.closed.open_edges);
+        run.warnings.push(text);
+    }
+}
+
+impl Colliders {
+    /// The deforming skin at a frame; `None` if it doesn't deform.
+    pub(super) fn end(&self, position: Option<&[[f64; 3]]>, unit: f64) -> Option<Rc<End>> {
+        let (skin, position) = self.skin.as_ref().zip(position)?;
+        Some(Rc::new(End { surface: skin.at(position, unit, &self.settings) }))
     }
 
-    /// What hair can't enter from the last frame to this one. A skin that moves as a whole stays in its rest coordinates.
-    pub fn body<'a>(&'a self, motion: Motion<'a>, seconds: f64) -> Body<'a> {
-        let Some(now) = &self.now else { return Body::default() };
-        let (shape, velocity) = match (&self.before, &self.flow) {
-            (Some(before), Some([a, b])) => {
-                let deforming = Deforming { field: [&before.field, &now.field], flow: [a, b], seconds };
-                (Shape::Deforming(deforming), Some(&self.velocity[..]))
-            }
-            _ => (Shape::Field(&now.field), None),
-        };
-        let exact = Some(Exact { bvh: &now.bvh, triangle: &self.closed.mesh.triangle, velocity });
-        Body { parts: vec![Part { motion, shape, exact }], seconds }
+    /// The deforming skin over a span of `seconds` between two frames.
+    pub(super) fn moving(&self, ends: [Rc<End>; 2], seconds: f64) -> Option<Moving> {
+        let triangle = &self.skin.as_ref()?.closed.mesh.triangle;
+        let [a, b] = [&ends[0].surface, &ends[1].surface];
+        let rate = |(p, q): (&[f64; 3], &[f64; 3])| std::array::from_fn(|x| (q[x] - p[x]) / seconds);
+        let velocity: Vec<[f64; 3]> = a.position.iter().zip(&b.position).map(rate).collect();
+        let flow = [a.field.flow(triangle, &velocity), b.field.flow(triangle, &velocity)];
+        Some(Moving { seconds, ends, flow, velocity })
     }
+
+    /// Motions of the solids that move by themselves over the span that begins at a frame.
+    pub(super) fn motions(&self, from: f64, unit: f64) -> Vec<Box<dyn Fn(f64) -> Rigid + Sync + '_>> {
+        let motion = move |m: &'_ Option<SkinMotion>, f: f64| {
+            m.as_ref().map_or(Rigid::default(), |m| super::simulate::placement(&m.at(from + f), unit))
+        };
+        let own = self.rigid.iter().filter_map(|r| r.motion.as_ref());
+        own.map(|m| Box::new(move |f: f64| motion(m, f)) as Box<dyn Fn(f64) -> Rigid + Sync>).collect()
+    }
+
+    /// Everything over a span: `skin` is the motion of a skin that moves as a whole, `own` those of other solids.
+    pub(super) fn body<'a>(
+        &'a self,
+        skin: &'a (dyn Fn(f64) -> Rigid + Sync),
+        own: &'a [Box<dyn Fn(f64) -> Rigid + Sync + 'a>],
+        moving: Option<&'a Moving>,
+        seconds: f64,
+    ) -> Body<'a> {
+        let mut parts = Vec::new();
+        let mut own = own.iter();
+        for r in &self.rigid {
+            let motion = if r.motion.is_some() { &**own.next().expect("a motion each") } else { skin };
+            let shape = r.ellipsoid.as_ref().map_or(Shape::Field(&r.surface.field), Shape::Ellipsoid);
+            let triangle = &r.solid.closed.mesh.triangle;
+            let exact = r.ellipsoid.is_none().then_some(Exact { bvh: &r.surface.bvh, triangle, velocity: None });
+            parts.push(Part { motion, shape, exact });
+        }
+        if let Some((m, solid)) = moving.zip(self.skin.as_ref()) {
+            let field = [&m.ends[0].surface.field, &m.ends[1].surface.field];
+            let shape = Shape::Deforming(Deforming { field, flow: [&m.flow[0], &m.flow[1]], seconds: m.seconds });
+            let triangle = &solid.closed.mesh.triangle;
+            let exact = Some(Exact { bvh: &m.ends[1].surface.bvh, triangle, velocity: Some(&m.velocity) });
+            parts.push(Part { motion: &still, shape, exact });
+        }
+        Body { parts, seconds }
+    }
+}
+
+fn still(_: f64) -> Rigid {
+    Rigid::default()
+}
+
+/// True if the skin of a shot deforms.
+pub(super) fn deforms(timeline: &Timeline<'_>) -> bool {
+    timeline.rigid(timeline.first, timeline.first as f64).is_none()
 }

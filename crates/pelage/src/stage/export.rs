@@ -2,7 +2,7 @@
 //! then renamed.
 
 use super::run::{Counts, Runner};
-use super::{Step, What, groom, instance, interpolate};
+use super::{Step, What, curves, groom, instance, interpolate};
 use crate::Error;
 use crate::config::{ExportFormat, UpAxis};
 use crate::files::unfinished;
@@ -73,7 +73,7 @@ impl Drop for Parts {
 
 /// Facts of the shot that every file states.
 pub fn facts(run: &mut Runner<'_>) -> Result<ShotFacts, Error> {
-    let origin = groom::skin(run)?.origin();
+    let origin = run.origin()?;
     let shot = &run.project.shot.value.shot;
     Ok(ShotFacts {
         name: shot.name.clone(),
@@ -93,6 +93,9 @@ fn hair_layer(run: &mut Runner<'_>, i: usize) -> Result<HairLayer, Error> {
 
 /// A layer's hairs without any positions.
 pub fn look(run: &mut Runner<'_>, i: usize) -> Result<HairLayer, Error> {
+    if run.project.curves.is_some() {
+        return curves::look(run);
+    }
     let skin = groom::skin(run)?;
     let roots = instance::roots(run, i)?;
     let width = instance::column(run, What::Width(i), i)?;

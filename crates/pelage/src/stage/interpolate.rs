@@ -1,7 +1,7 @@
 //! Interpolate: every hair at every frame, from control hairs on the skin of that frame.
 
 use super::run::{Counts, Runner};
-use super::{What, groom, instance, simulate};
+use super::{What, curves, groom, instance, simulate};
 use crate::Error;
 use crate::config::Target;
 use crate::format::mcap;
@@ -60,9 +60,14 @@ pub fn positions(run: &mut Runner<'_>, what: What) -> Result<Vec<[f32; 3]>, Erro
     }
     let (out, cancelled) = match (what, run.project.target(i)) {
         (What::Frame(_, f), Target::EveryHair) => (simulate::positions(run, i, f)?, 0),
+        (What::Frame(_, f), _) if run.project.curves.is_some() => (curves::ridden(run, f)?, 0),
+        _ if run.project.curves.is_some() => (curves::rest(run)?, 0),
         _ => blended(run, what, i, &at)?,
     };
-    let hairs = instance::roots(run, i)?.id.len();
+    let hairs = match &run.project.curves {
+        Some(_) => curves::hair(run)?.offsets.len(),
+        None => instance::roots(run, i)?.id.len(),
+    };
     let counts = Counts::from([
         ("hairs".to_owned(), hairs as u64),
         ("points".to_owned(), out.len() as u64),

@@ -7,6 +7,7 @@ mod plan_simulate;
 mod run;
 mod skin;
 
+pub mod curves;
 pub mod export;
 pub mod groom;
 pub mod instance;

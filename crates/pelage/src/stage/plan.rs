@@ -10,6 +10,8 @@ use std::collections::BTreeMap;
 /// What a step makes. Layers are numbered as in the groom file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum What {
+    /// Hair from a curves file, bound to the skin.
+    Curves,
     /// Sites and roots of the control hairs.
     Place,
     /// Control hairs after combing.
@@ -67,6 +69,7 @@ pub struct Plan {
 
 /// Versions of the stages' results. Raise one whenever its code gives other bytes for the same input.
 pub(super) mod version {
+    pub const CURVES: u32 = 1;
     pub const PLACE: u32 = 1;
     pub const COMB: u32 = 1;
     pub const CANDIDATES: u32 = 1;
@@ -101,6 +104,66 @@ impl Plan {
     pub fn new(project: &Project) -> Self {
         let mut plan = Plan { steps: Vec::new(), index: BTreeMap::new() };
         let r = Reader::new(project);
+        match &project.curves {
+            Some(_) => plan.add_curves(&r),
+            None => plan.add_groom(&r),
+        }
+        let timeline = Timeline::new(project);
+        for i in (0..project.groom.value.layer.len()).filter(|i| project.target(*i) != Target::Off) {
+            for k in 0..timeline.stretches() {
+                plan.add_stretch(&r, &timeline, i, k);
+            }
+        }
+        for (frame, at) in &project.frames {
+            for (i, layer) in project.groom.value.layer.iter().enumerate() {
+                let simulated = What::Simulate(i, timeline.stretch_of(*frame));
+                let reads: &[What] = match project.target(i) {
+                    Target::Off if project.curves.is_some() => &[What::Curves, What::Rest(0)],
+                    Target::EveryHair => &[simulated],
+                    Target::ControlHairs => &[simulated, What::Roots(i), What::Weights(i), What::Length(i)],
+                    Target::Off => &[What::Comb, What::Roots(i), What::Weights(i), What::Length(i)],
+                };
+                let name = format!("interpolate/{}/{frame}", layer.name);
+                plan.add(What::Frame(i, *frame), name, Stage::Interpolate, r.frame(i, at, *frame), reads);
+            }
+        }
+        let layers = 0..project.groom.value.layer.len();
+        let columns = layers.clone().flat_map(|i| [What::Width(i), What::Opacity(i), What::Color(i)]);
+        let look: Vec<What> = if project.curves.is_some() { vec![What::Curves] } else { columns.collect() };
+        let mut all = look.clone();
+        all.extend(layers.clone().map(What::Rest));
+        all.extend(project.frames.keys().flat_map(|f| layers.clone().map(|i| What::Frame(i, *f))));
+        for format in &project.shot.value.export.formats {
+            let name = format!("export/{}", format.name());
+            plan.add(What::Export(*format), name, Stage::Export, r.export(*format), &all);
+        }
+        let of = |frames: &[i32]| {
+            let frames = frames.iter().flat_map(|f| layers.clone().map(|i| What::Frame(i, *f)));
+            look.iter().copied().chain(frames).collect::<Vec<What>>()
+        };
+        let still = of(&[project.still_frame()]);
+        let picture = r.picture().param("frame", project.still_frame(), r.in_shot("preview.frame"));
+        plan.add(What::Still, "preview/still".into(), Stage::Preview, picture, &still);
+        let sheet = of(&project.sheet_frames());
+        let pictures =
+            r.picture().param("sheet", frame_list(&project.sheet_frames()), r.in_shot("preview.sheet (frames)"));
+        plan.add(What::Sheet, "preview/sheet".into(), Stage::Preview, pictures, &sheet);
+        plan
+    }
+
+    /// Steps of hair from a curves file up to its rest pose.
+    fn add_curves(&mut self, r: &Reader<'_>) {
+        let file = r.project.curves.as_ref().expect("a shot with curves");
+        let recipe =
+            r.unit(Recipe::new("instance/curves", version::CURVES)).file("curves", &file.hash, file.label.clone());
+        self.add(What::Curves, "instance/curves".into(), Stage::Instance, r.rest(recipe), &[]);
+        let recipe = r.points(0, Recipe::new("interpolate", version::INTERPOLATE));
+        self.add(What::Rest(0), "interpolate/hair/rest".into(), Stage::Interpolate, recipe, &[What::Curves]);
+    }
+
+    /// Steps of a groom up to the hairs' rest pose.
+    fn add_groom(&mut self, r: &Reader<'_>) {
+        let (plan, project) = (self, r.project);
         plan.add(What::Place, "groom/place".into(), Stage::Groom, r.place(), &[]);
         plan.add(What::Comb, "groom/comb".into(), Stage::Groom, r.comb(), &[What::Place]);
         for (i, layer) in project.groom.value.layer.iter().enumerate() {
@@ -135,46 +198,6 @@ impl Plan {
             let rest = r.skin(r.points(i, rest), &SkinAt::Rest, 0);
             plan.add(What::Rest(i), name, Stage::Interpolate, rest, &reads);
         }
-        let timeline = Timeline::new(project);
-        for i in (0..project.groom.value.layer.len()).filter(|i| project.target(*i) != Target::Off) {
-            for k in 0..timeline.stretches() {
-                plan.add_stretch(&r, &timeline, i, k);
-            }
-        }
-        for (frame, at) in &project.frames {
-            for (i, layer) in project.groom.value.layer.iter().enumerate() {
-                let simulated = What::Simulate(i, timeline.stretch_of(*frame));
-                let reads: &[What] = match project.target(i) {
-                    Target::EveryHair => &[simulated],
-                    Target::ControlHairs => &[simulated, What::Roots(i), What::Weights(i), What::Length(i)],
-                    Target::Off => &[What::Comb, What::Roots(i), What::Weights(i), What::Length(i)],
-                };
-                let name = format!("interpolate/{}/{frame}", layer.name);
-                plan.add(What::Frame(i, *frame), name, Stage::Interpolate, r.frame(i, at, *frame), reads);
-            }
-        }
-        let layers = 0..project.groom.value.layer.len();
-        let columns = layers.clone().flat_map(|i| [What::Width(i), What::Opacity(i), What::Color(i)]);
-        let look: Vec<What> = columns.collect();
-        let mut all = look.clone();
-        all.extend(layers.clone().map(What::Rest));
-        all.extend(project.frames.keys().flat_map(|f| layers.clone().map(|i| What::Frame(i, *f))));
-        for format in &project.shot.value.export.formats {
-            let name = format!("export/{}", format.name());
-            plan.add(What::Export(*format), name, Stage::Export, r.export(*format), &all);
-        }
-        let of = |frames: &[i32]| {
-            let frames = frames.iter().flat_map(|f| layers.clone().map(|i| What::Frame(i, *f)));
-            look.iter().copied().chain(frames).collect::<Vec<What>>()
-        };
-        let still = of(&[project.still_frame()]);
-        let picture = r.picture().param("frame", project.still_frame(), r.in_shot("preview.frame"));
-        plan.add(What::Still, "preview/still".into(), Stage::Preview, picture, &still);
-        let sheet = of(&project.sheet_frames());
-        let pictures =
-            r.picture().param("sheet", frame_list(&project.sheet_frames()), r.in_shot("preview.sheet (frames)"));
-        plan.add(What::Sheet, "preview/sheet".into(), Stage::Preview, pictures, &sheet);
-        plan
     }
 
     fn add(&mut self, what: What, name: String, stage: Stage, mut recipe: Recipe, reads: &[What]) {
@@ -234,7 +257,7 @@ impl What {
             What::Candidates(i) | What::Roots(i) | What::Weights(i) | What::Rest(i) => Some(i),
             What::Simulate(i, _) | What::Frame(i, _) => Some(i),
             What::Length(i) | What::Width(i) | What::Opacity(i) | What::Color(i) => Some(i),
-            What::Place | What::Comb | What::Export(_) | What::Still | What::Sheet => None,
+            What::Curves | What::Place | What::Comb | What::Export(_) | What::Still | What::Sheet => None,
         }
     }
 }
@@ -271,7 +294,10 @@ impl<'a> Reader<'a> {
     }
 
     pub(super) fn rest(&self, recipe: Recipe) -> Recipe {
-        recipe.file("rest", &self.project.rest.hash, self.project.rest.label.clone())
+        match &self.project.rest {
+            Some(rest) => recipe.file("rest", &rest.hash, rest.label.clone()),
+            None => recipe,
+        }
     }
 
     /// Scale between scene units and the units of a groom file.
@@ -394,6 +420,11 @@ impl<'a> Reader<'a> {
     }
 
     fn points(&self, i: usize, r: Recipe) -> Recipe {
+        if self.project.curves.is_some() {
+            let segments =
+                self.project.shot.value.simulate.segments.map_or("as they are".to_owned(), |s| s.to_string());
+            return r.param("segments", segments, self.in_shot("simulate.segments"));
+        }
         let label = match self.project.target(i) {
             Target::EveryHair => self.in_shot("simulate.segments (points)"),
             _ => self.in_groom(&format!("layer[{i}].points")),

@@ -55,6 +55,7 @@ impl Reader<'_> {
         r = r.param("frames", format!("{first}-{end}"), self.in_shot("shot.frames (simulated)"));
         let simulated = *timeline.simulated(k).start()..=end;
         r = self.forces(r, *simulated.start() - 1, end);
+        r = self.body(r, *simulated.start() - 1, end);
         let arrival = timeline.arrival();
         if k == 0 {
             r = r.param("preroll", timeline.preroll, self.in_shot("shot.preroll"));
@@ -63,7 +64,8 @@ impl Reader<'_> {
             r = r.param("arrival", arrival - first, self.in_shot("skin (frames before the first)"));
             r = self.easing(r, timeline, arrival, end);
         }
-        for frame in (*simulated.start()).max(arrival)..=end {
+        let from = if k == 0 { timeline.start().max(arrival) } else { first };
+        for frame in from..=end {
             r = self.skin_at(r, timeline, frame, frame > arrival);
         }
         r
@@ -72,11 +74,15 @@ impl Reader<'_> {
     fn settings(&self, r: Recipe) -> Recipe {
         let s = &self.project.shot.value.simulate;
         let substeps = s.substeps.map_or("automatic".to_owned(), |n| n.to_string());
+        let segments = match (&self.project.curves, s.segments) {
+            (Some(_), None) => "as they are".to_owned(),
+            _ => self.project.segments().to_string(),
+        };
         let values = [
             ("model", format!("{:?}", s.model).to_lowercase()),
-            ("segments", self.project.segments().to_string()),
+            ("segments", segments),
             ("substeps", substeps),
-            ("sag_free", s.sag_free.unwrap_or(true).to_string()),
+            ("sag_free", self.project.sag_free().to_string()),
             ("strain_limit", s.strain_limit.to_string()),
             ("friction", s.friction.to_string()),
             ("offset", s.offset.to_string()),
@@ -89,9 +95,9 @@ impl Reader<'_> {
     }
 
     fn material(&self, r: Recipe, i: usize) -> Recipe {
-        let values = self.project.groom.value.layer[i].material.values();
-        let label = |key: &str| self.in_groom(&format!("layer[{i}].material.{key}"));
-        values.into_iter().fold(r, |r, (key, x)| r.param(&format!("material.{key}"), x, label(key)))
+        let (at, material) = self.project.material(i);
+        let label = |key: &str| self.in_groom(&format!("{at}.{key}"));
+        material.values().into_iter().fold(r, |r, (key, x)| r.param(&format!("material.{key}"), x, label(key)))
     }
 
     /// Gravity and wind as they are from one frame to another.
@@ -101,8 +107,51 @@ impl Reader<'_> {
         let frames = (from..=to).map(|f| f as f64);
         let r = r.param("gravity", values(&gravity, frames), self.in_shot("simulate.gravity"));
         let Some(wind) = &shot.simulate.wind else { return r };
-        let middles = (from..to).map(|f| f as f64 + 0.5);
-        r.param("wind.velocity", values(&wind.velocity.vectors(), middles), self.in_shot("simulate.wind.velocity"))
+        let all: Vec<pelage_sim::Wind> = (from..to).map(|f| wind.at(f as f64 + 0.5, shot.shot.fps)).collect();
+        let velocity = once(all.iter().map(|w| format!("{:?}", w.velocity)));
+        let mut r = r.param("wind.velocity", velocity, self.in_shot("simulate.wind.velocity"));
+        type Of = fn(&pelage_sim::Wind) -> f64;
+        let strengths: [(&str, Of); 6] = [
+            ("gust", |w| w.gust),
+            ("gust_period", |w| w.gust_period),
+            ("turbulence", |w| w.turbulence),
+            ("turbulence_size", |w| w.turbulence_size),
+            ("turbulence_period", |w| w.turbulence_period),
+            ("boundary", |w| w.boundary),
+        ];
+        for (key, of) in strengths {
+            let value = once(all.iter().map(|w| of(w).to_string()));
+            r = r.param(&format!("wind.{key}"), value, self.in_shot(&format!("simulate.wind.{key}")));
+        }
+        if all.iter().any(|w| w.turbulence != 0.0) {
+            let drift = once(all.iter().map(|w| format!("{:?}", w.drift)));
+            r = r.param("wind.drift", drift, self.in_shot("simulate.wind.velocity (how far it carries)"));
+        }
+        r.param("wind.seed", wind.seed, self.in_shot("simulate.wind.seed"))
+    }
+
+    /// What hair can't enter, apart from the skin's motion.
+    fn body(&self, r: Recipe, from: i64, to: i64) -> Recipe {
+        let b = &self.project.shot.value.simulate.body;
+        let in_shot = |key: &str| self.in_shot(&format!("simulate.body.{key}"));
+        let skin = b.skin && self.project.rest.is_some();
+        let mut r = r.param("body.skin", skin, in_shot("skin"));
+        if skin || !self.project.bodies.is_empty() {
+            for (key, x) in [("voxel", b.voxel), ("outside", b.outside), ("inside", b.inside)] {
+                r = r.param(&format!("body.{key}"), x, in_shot(key));
+            }
+        }
+        for (i, m) in self.project.bodies.iter().enumerate() {
+            let name = format!("mesh[{i}]");
+            r = r.file(&name, &m.file.hash, m.file.label.clone());
+            r = r.param(&format!("{name}.shape"), format!("{:?}", m.shape), in_shot(&format!("{name}.shape")));
+            for (frame, motion) in m.motion.iter().flat_map(|motion| (from..=to).map(move |f| (f, motion))) {
+                let samples = between(motion, frame).filter(|_| frame > from).unwrap_or_default();
+                let value = format!("{:?} {samples}", motion.at(frame as f64));
+                r = r.file(&format!("skin.{frame}.{name}"), &value, format!("{} at frame {frame}", motion.file.label));
+            }
+        }
+        r
     }
 
     /// What the way from the rest pose into the motion reads of the motion, where its frames do not say it.
@@ -150,9 +199,14 @@ fn between(m: &SkinMotion, frame: i64) -> Option<String> {
 
 /// Values at some frames; once, if they are all the same.
 fn values(keyed: &Keyed<[f64; 3]>, frames: impl Iterator<Item = f64>) -> String {
-    let all: Vec<[f64; 3]> = frames.map(|f| keyed.at(f)).collect();
+    once(frames.map(|f| format!("{:?}", keyed.at(f))))
+}
+
+/// Values in a row; once, if they are all the same.
+fn once(values: impl Iterator<Item = String>) -> String {
+    let all: Vec<String> = values.collect();
     match all.first() {
-        Some(first) if all.iter().all(|v| v == first) => format!("{first:?}"),
-        _ => format!("{all:?}"),
+        Some(first) if all.iter().all(|v| v == first) => first.clone(),
+        _ => format!("[{}]", all.join(", ")),
     }
 }

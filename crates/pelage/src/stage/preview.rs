@@ -1,12 +1,12 @@
 //! Preview: pictures of the hair by which a groom is judged.
 
 use super::run::Runner;
-use super::{What, export, groom, instance, interpolate};
+use super::{SkinPose, What, curves, export, groom, instance, interpolate};
 use crate::Error;
 use crate::config::UpAxis;
 use crate::files::unfinished;
 use crate::format::{HairLayer, image::write_png};
-use pelage_geom::Offsets;
+use pelage_geom::{Offsets, SurfacePoint};
 use pelage_light::{Camera, HairView, Image, Scene, Settings, SkinView, contact_sheet, render, studio_lights};
 
 /// Linear grey of the background: dark enough for light hair, light enough for dark hair.
@@ -56,7 +56,7 @@ fn drawn(run: &mut Runner<'_>) -> Result<Drawn, Error> {
     let count = run.project.groom.value.layer.len();
     let mut hairs = 0;
     for i in 0..count {
-        hairs += instance::roots(run, i)?.id.len();
+        hairs += export::look(run, i)?.offsets.len();
     }
     let every = hairs.div_ceil(DRAWN).max(1);
     let layers = (0..count).map(|i| Ok(thinned(export::look(run, i)?, every))).collect::<Result<_, Error>>()?;
@@ -64,41 +64,43 @@ fn drawn(run: &mut Runner<'_>) -> Result<Drawn, Error> {
     Ok(Drawn { layers, every })
 }
 
-/// Every n-th hair, n times as wide. All hairs of a layer have the same number of points.
+/// Every n-th hair, n times as wide.
 fn thinned(layer: HairLayer, every: usize) -> HairLayer {
-    let points = layer.offsets.uniform_count().unwrap_or(1);
     if every == 1 {
         return layer;
     }
-    let color: Vec<[f32; 3]> = layer.color.into_iter().step_by(every).collect();
     HairLayer {
-        offsets: Offsets::uniform(color.len(), points),
-        width: nth(&layer.width, points, every).map(|w| w * every as f32).collect(),
+        width: nth(&layer.width, &layer.offsets, every).map(|w| w * every as f32).collect(),
+        offsets: Offsets::from_counts(layer.offsets.counts().step_by(every)),
         opacity: layer.opacity.into_iter().step_by(every).collect(),
-        color,
+        color: layer.color.into_iter().step_by(every).collect(),
         ..HairLayer::default()
     }
 }
 
-/// Values of every n-th hair of `points` values each.
-fn nth<T: Copy>(values: &[T], points: usize, every: usize) -> impl Iterator<Item = T> + '_ {
-    values.chunks(points.max(1)).step_by(every).flatten().copied()
+/// Values of every n-th hair.
+fn nth<'a, T: Copy>(values: &'a [T], offsets: &'a Offsets, every: usize) -> impl Iterator<Item = T> + 'a {
+    (0..offsets.len()).step_by(every).flat_map(|h| values[offsets.range(h)].iter().copied())
 }
 
 /// Positions of the hairs to draw.
 fn positions(run: &mut Runner<'_>, drawn: &Drawn, i: usize, frame: i32) -> Result<Vec<[f32; 3]>, Error> {
     let all = interpolate::positions(run, What::Frame(i, frame))?;
-    let points = drawn.layers[i].offsets.uniform_count().unwrap_or(1);
-    Ok(if drawn.every == 1 { all } else { nth(&all, points, drawn.every).collect() })
+    if drawn.every == 1 {
+        return Ok(all);
+    }
+    let offsets = export::look(run, i)?.offsets;
+    Ok(nth(&all, &offsets, drawn.every).collect())
 }
 
 /// A camera that sees skin and hair at all of the frames, as near as it can.
 fn camera(run: &mut Runner<'_>, drawn: &Drawn, frames: &[i32]) -> Result<Camera, Error> {
-    let skin = groom::skin(run)?;
-    let origin = skin.origin();
+    let origin = run.origin()?;
     let mut points = Vec::new();
     for frame in frames {
-        points.extend_from_slice(&skin.pose(&run.project.frames[frame])?.position);
+        if let Some(pose) = pose(run, *frame)? {
+            points.extend_from_slice(&pose.position);
+        }
         for (i, layer) in drawn.layers.iter().enumerate() {
             let position = positions(run, drawn, i, *frame)?;
             let hairs = layer.offsets.len();
@@ -114,19 +116,39 @@ fn camera(run: &mut Runner<'_>, drawn: &Drawn, frames: &[i32]) -> Result<Camera,
     Ok(Camera::frame_points(points, shot.preview.from.map(|x| -x), up, aspect).zoomed(shot.preview.zoom))
 }
 
-fn draw(run: &mut Runner<'_>, drawn: &Drawn, camera: &Camera, frame: i32, size: [u32; 2]) -> Result<Image, Error> {
+/// The skin at a frame, if there is one.
+fn pose(run: &mut Runner<'_>, frame: i32) -> Result<Option<SkinPose>, Error> {
+    match &run.project.rest {
+        Some(_) => Ok(Some(groom::skin(run)?.pose(&run.project.frames[&frame])?)),
+        None => Ok(None),
+    }
+}
+
+/// Normals of the skin at the roots that are drawn.
+fn normals(run: &mut Runner<'_>, drawn: &Drawn, pose: &SkinPose, i: usize) -> Result<Vec<[f32; 3]>, Error> {
     let skin = groom::skin(run)?;
+    let of = |root: &[SurfacePoint]| root.iter().step_by(drawn.every).map(|p| skin.normal(pose, p)).collect();
+    Ok(match &run.project.curves {
+        Some(_) => of(&curves::hair(run)?.root),
+        None => of(&instance::roots(run, i)?.root),
+    })
+}
+
+fn draw(run: &mut Runner<'_>, drawn: &Drawn, camera: &Camera, frame: i32, size: [u32; 2]) -> Result<Image, Error> {
     let layers = &drawn.layers;
-    let pose = skin.pose(&run.project.frames[&frame])?;
+    let (pose, origin) = (pose(run, frame)?, run.origin()?);
     let positions = (0..layers.len()).map(|i| positions(run, drawn, i, frame)).collect::<Result<Vec<_>, Error>>()?;
     let normals = (0..layers.len())
-        .map(|i| Ok(instance::roots(run, i)?.root.iter().step_by(drawn.every).map(|p| skin.normal(&pose, p)).collect()))
+        .map(|i| match &pose {
+            Some(pose) => normals(run, drawn, pose, i),
+            None => Ok(Vec::new()),
+        })
         .collect::<Result<Vec<Vec<[f32; 3]>>, Error>>()?;
     let views: Vec<HairView<'_>> = (0..layers.len())
         .map(|i| HairView {
             offsets: &layers[i].offsets,
             position: &positions[i],
-            origin: skin.origin(),
+            origin,
             width: &layers[i].width,
             color: &layers[i].color,
             opacity: &layers[i].opacity,
@@ -134,9 +156,14 @@ fn draw(run: &mut Runner<'_>, drawn: &Drawn, camera: &Camera, frame: i32, size: 
         })
         .collect();
     let lights = studio_lights(camera);
-    let surface =
-        SkinView { position: &pose.position, triangle: &skin.mesh.triangle, normal: &pose.normal, color: SKIN };
-    let scene = Scene { skin: Some(surface), layers: &views, lights: &lights, background: BACKGROUND };
+    let skin = if pose.is_some() { Some(groom::skin(run)?) } else { None };
+    let surface = pose.as_ref().zip(skin.as_ref()).map(|(pose, skin)| SkinView {
+        position: &pose.position,
+        triangle: &skin.mesh.triangle,
+        normal: &pose.normal,
+        color: SKIN,
+    });
+    let scene = Scene { skin: surface, layers: &views, lights: &lights, background: BACKGROUND };
     Ok(render(&scene, camera, size[0] as usize, size[1] as usize, &Settings::default()).0)
 }
 

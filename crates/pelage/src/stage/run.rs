@@ -61,6 +61,8 @@ pub struct Runner<'a> {
     pub(super) layers: BTreeMap<usize, Rc<super::interpolate::LayerHairs>>,
     pub(super) placed: Option<pelage_groom::control::ControlHairs>,
     pub(super) control: Option<Rc<pelage_groom::control::ControlHairs>>,
+    pub(super) curves: Option<Rc<super::curves::CurveHair>>,
+    pub(super) colliders: Option<Rc<super::body::Colliders>>,
     pub(super) running: Option<super::simulate::Running>,
     /// Frames that this run simulated (true), or took over from a run that was killed or ended earlier.
     simulated: BTreeMap<i64, bool>,
@@ -95,6 +97,8 @@ impl<'a> Runner<'a> {
             layers: BTreeMap::new(),
             placed: None,
             control: None,
+            curves: None,
+            colliders: None,
             running: None,
             simulated: BTreeMap::new(),
             hashes: RefCell::new(FileHashes::open(&cache)),
@@ -153,6 +157,14 @@ impl<'a> Runner<'a> {
     /// Shows the fraction done of something that takes long; never stops it.
     pub(super) fn ticker(&self, what: &str) -> impl Fn(f64) -> bool + Sync + use<> {
         self.progress.ticker(what)
+    }
+
+    /// Scene-space point that positions are relative to.
+    pub fn origin(&mut self) -> Result<[f64; 3], Error> {
+        match &self.project.rest {
+            Some(_) => Ok(super::groom::skin(self)?.origin()),
+            None => Ok(super::curves::hair(self)?.origin),
+        }
     }
 
     /// Reads a map that the groom names.
@@ -224,8 +236,13 @@ impl<'a> Runner<'a> {
         }
     }
 
+    /// What every other step of a layer follows from.
+    fn first_of_layer(&self, i: usize) -> What {
+        if self.project.curves.is_some() { What::Curves } else { What::Roots(i) }
+    }
+
     fn in_new_layer(&self, step: &Step) -> bool {
-        step.what.layer().is_some_and(|i| !self.last.contains_key(&self.plan.step(What::Roots(i)).name))
+        step.what.layer().is_some_and(|i| !self.last.contains_key(&self.plan.step(self.first_of_layer(i)).name))
     }
 
     /// Why a step runs, if it is not for something that it reads.
@@ -380,8 +397,9 @@ impl<'a> Runner<'a> {
     }
 
     fn make(&mut self, what: What) -> Result<(), Error> {
-        use super::{export, groom, instance, interpolate, preview, simulate};
+        use super::{curves, export, groom, instance, interpolate, preview, simulate};
         match what {
+            What::Curves => curves::hair(self).map(drop),
             What::Place => groom::placed(self).map(drop),
             What::Comb => groom::combed(self).map(drop),
             What::Candidates(i) => instance::candidates(self, i).map(drop),

@@ -1,18 +1,17 @@
 //! Simulate: hair in motion, one stretch of frames after another, each from the checkpoint at the end of the one before.
 
-use super::body::SkinBody;
 use super::run::{Counts, Runner};
-use super::{What, groom, instance, interpolate};
+use super::{What, body, curves, groom, instance, interpolate};
 use crate::Error;
 use crate::cache::LongStep;
-use crate::config::{StrandModel, Target, WindSettings};
+use crate::config::{StrandModel, Target};
 use crate::format::{mcap, ply};
 use crate::project::SkinAt;
 use crate::timeline::Timeline;
 use pelage_geom::ride::{Ride, ease_positions, rides};
 use pelage_geom::{Offsets, Pose, SurfacePoint, Vec3};
 use pelage_groom::control;
-use pelage_sim::{FieldSettings, Hairs, Model, Rigid, Root, Settings, SimError, Simulation, Span, SpanReport, Started, Wind};
+use pelage_sim::{Hairs, Model, Rigid, Root, Settings, SimError, Simulation, Span, SpanReport, Started};
 use rayon::prelude::*;
 use std::time::Instant;
 
@@ -23,7 +22,7 @@ const SAVING: f64 = 0.03;
 /// Strands that a warning names.
 const NAMED: usize = 8;
 
-/// How far a skin may be from its rest pose where the simulation starts, relative to its size.
+/// How far roots may be from their rest pose where the simulation starts, relative to the hair's size; a turn in radians squared.
 const AT_REST: f64 = 1e-6;
 
 /// Count of strands at rest: what the stage skips.
@@ -40,7 +39,6 @@ pub(super) struct Running {
     frame: i64,
     sim: Simulation,
     source: Source,
-    skin: SkinBody,
 }
 
 /// Hairs at rest, as they are simulated.
@@ -49,7 +47,10 @@ struct Source {
     /// Metres.
     position: Vec<[f64; 3]>,
     id: Vec<u64>,
+    /// On the rest skin; empty without one.
     root: Vec<SurfacePoint>,
+    /// Where the roots are at rest, scene units.
+    anchor: Vec<[f64; 3]>,
 }
 
 /// Positions of a simulated layer at a frame, scene units relative to the skin's origin.
@@ -108,7 +109,7 @@ pub fn make(run: &mut Runner<'_>, what: What) -> Result<(), Error> {
             running
         }
     };
-    for frame in first..=begin {
+    for frame in first..=at.unwrap_or(first - 1) {
         run.simulated(frame, false);
     }
     advance(run, &timeline, &mut running, &mut step, k, end)?;
@@ -168,10 +169,7 @@ fn start(run: &mut Runner<'_>, i: usize, timeline: &Timeline<'_>) -> Result<(Run
     let hairs = Hairs { offsets: &source.offsets, position: &source.position, id: &source.id };
     let gravity = shot.simulate.gravity.downward(shot.shot.up).at(timeline.start() as f64);
     let (sim, started) = Simulation::new(&hairs, &settings, gravity).map_err(|e| failed(run, i, &e))?;
-    let skin = groom::skin(run)?;
-    let unit = run.project.shot.value.shot.meters_per_unit;
-    let skin = SkinBody::new(&skin, unit, FieldSettings::default(), &source.offsets, &source.position);
-    let running = Running { layer: i, frame: timeline.start(), sim, source, skin };
+    let running = Running { layer: i, frame: timeline.start(), sim, source };
     if timeline.preroll == 0 {
         check_at_rest(run, timeline, &running.source)?;
     }
@@ -185,7 +183,19 @@ fn size(bytes: u64) -> String {
 
 fn source(run: &mut Runner<'_>, i: usize) -> Result<Source, Error> {
     let unit = run.project.shot.value.shot.meters_per_unit;
+    if run.project.curves.is_some() {
+        let (hair, offsets) = (curves::hair(run)?, curves::offsets(run)?);
+        let rest = interpolate::positions(run, What::Rest(i))?;
+        return Ok(Source {
+            offsets,
+            position: rest.iter().map(|p| hair.scene(p).map(|x| x * unit)).collect(),
+            id: hair.id.clone(),
+            root: hair.root.clone(),
+            anchor: hair.anchors(),
+        });
+    }
     let skin = groom::skin(run)?;
+    let anchors = |root: &[SurfacePoint]| root.iter().map(|p| p.blend(skin.corners(p)).into()).collect();
     if run.project.target(i) == Target::EveryHair {
         let (roots, points) = (instance::roots(run, i)?, run.project.points(i));
         let rest = interpolate::positions(run, What::Rest(i))?;
@@ -196,6 +206,7 @@ fn source(run: &mut Runner<'_>, i: usize) -> Result<Source, Error> {
             position: rest.par_iter().map(metres).collect(),
             id: roots.id.clone(),
             root: roots.root.clone(),
+            anchor: anchors(&roots.root),
         });
     }
     let controls = groom::combed(run)?;
@@ -209,6 +220,7 @@ fn source(run: &mut Runner<'_>, i: usize) -> Result<Source, Error> {
         position: (0..controls.len()).flat_map(hair).collect(),
         id: (0..controls.len() as u64).collect(),
         root: controls.root.clone(),
+        anchor: anchors(&controls.root),
     })
 }
 
@@ -220,10 +232,10 @@ fn settings(run: &Runner<'_>, i: usize) -> Settings {
             StrandModel::Springs => Model::Springs,
             StrandModel::Paper => Model::Paper,
         },
-        material: run.project.groom.value.layer[i].material.si(),
-        segments: Some(run.project.segments()),
+        material: run.project.material(i).1.si(),
+        segments: if run.project.curves.is_some() { s.segments } else { Some(run.project.segments()) },
         substeps: s.substeps,
-        sag_free: s.sag_free.unwrap_or(true),
+        sag_free: run.project.sag_free(),
         strain_limit: s.strain_limit,
         friction: s.friction,
         offset: s.offset * 1e-3,
@@ -245,7 +257,10 @@ fn note_start(
     started: &Started,
     step: &mut LongStep,
 ) -> Result<(), Error> {
-    let hairs = instance::roots(run, i)?.id.len();
+    let hairs = match &run.project.curves {
+        Some(_) => running.source.id.len(),
+        None => instance::roots(run, i)?.id.len(),
+    };
     let layer = &run.project.groom.value.layer[i].name;
     let counts = step.counts();
     for (name, n) in [
@@ -273,57 +288,58 @@ fn list(ids: &[u64]) -> String {
     named.join(", ") + &more
 }
 
-/// Where the roots are at a frame: in the world, or for a skin that moves as a whole, at rest.
-fn root_rides(run: &mut Runner<'_>, timeline: &Timeline<'_>, source: &Source, frame: i64) -> Result<Vec<Ride>, Error> {
-    let skin = groom::skin(run)?;
-    let arrival = timeline.arrival();
-    if timeline.rigid(arrival, 0.0).is_some() {
-        let on_skin = |p: &SurfacePoint| Ride::still(p.blend(skin.corners(p)).into());
-        return Ok(source.root.iter().map(on_skin).collect());
+/// Vertices of a skin that deforms, at a frame; `None` for one that moves as a whole.
+fn skin_position(run: &mut Runner<'_>, timeline: &Timeline<'_>, frame: i64) -> Result<Option<Vec<[f64; 3]>>, Error> {
+    if !body::deforms(timeline) {
+        return Ok(None);
     }
-    let position = skin_position(run, timeline, frame)?;
-    let pose = Pose::new(&skin.mesh, &skin.topology, position);
-    Ok(rides(&skin.mesh, &skin.topology, &skin.rest, &pose, &source.root))
-}
-
-/// Vertices of a skin that deforms, at a frame, scene units.
-fn skin_position(run: &mut Runner<'_>, timeline: &Timeline<'_>, frame: i64) -> Result<Vec<[f64; 3]>, Error> {
-    let skin = groom::skin(run)?;
-    let arrival = timeline.arrival();
+    let (skin, arrival) = (groom::skin(run)?, timeline.arrival());
     let read = |frame: i64| match timeline.skin_at(frame) {
         Some(SkinAt::File(file)) => Ok(ply::read_frame(&file.path, skin.mesh.position.len(), skin.faces())?),
         _ => Ok::<_, Error>(skin.mesh.position.clone()),
     };
     if frame >= arrival {
-        return read(frame);
+        return read(frame).map(Some);
     }
     let target = read(arrival)?;
     let next = if timeline.skin_at(arrival + 1).is_some() { read(arrival + 1)? } else { target.clone() };
     let (s, frames) = timeline.way(arrival, frame);
-    Ok(ease_positions(&skin.mesh.position, &target, &next, frames, s))
+    Ok(Some(ease_positions(&skin.mesh.position, &target, &next, frames, s)))
 }
 
-fn positions_of(roots: &[Root]) -> Vec<[f64; 3]> {
-    roots.iter().map(|r| r.position).collect()
+/// Where the roots are on a skin that deforms; at rest for one that moves as a whole.
+fn root_rides(run: &mut Runner<'_>, source: &Source, position: Option<&[[f64; 3]]>) -> Result<Vec<Ride>, Error> {
+    let Some(position) = position else { return Ok(source.anchor.iter().map(|a| Ride::still(*a)).collect()) };
+    let skin = groom::skin(run)?;
+    let pose = Pose::new(&skin.mesh, &skin.topology, position.to_vec());
+    Ok(rides(&skin.mesh, &skin.topology, &skin.rest, &pose, &source.root, &source.anchor))
 }
 
 /// Without pre-roll the simulation starts at the first frame: there the skin must be at rest.
 fn check_at_rest(run: &mut Runner<'_>, timeline: &Timeline<'_>, source: &Source) -> Result<(), Error> {
-    let skin = groom::skin(run)?;
-    let at_rest = rides(&skin.mesh, &skin.topology, &skin.rest, &skin.rest, &source.root);
-    let mut now = root_rides(run, timeline, source, timeline.first)?;
+    let position = skin_position(run, timeline, timeline.first)?;
+    let mut now = root_rides(run, source, position.as_deref())?;
     if let Some(t) = timeline.rigid(timeline.first, timeline.first as f64) {
-        now.iter_mut().for_each(|r| r.position = t.apply(Vec3::from(r.position)).into());
+        let place = |r: &mut Ride| *r = Ride { position: t.apply(Vec3::from(r.position)).into(), rotation: t.rotation };
+        now.iter_mut().for_each(place);
     }
-    let (low, high) = skin.mesh.bounds();
-    let tolerance = AT_REST * (Vec3::from(high) - Vec3::from(low)).norm();
-    let moved = |(a, b): (&Ride, &Ride)| (Vec3::from(a.position) - Vec3::from(b.position)).norm() > tolerance;
-    if at_rest.iter().zip(&now).any(moved) {
-        let what = format!("is 0, but the skin is not at its rest pose at frame {}", timeline.first);
+    let unit = run.project.shot.value.shot.meters_per_unit;
+    let (low, high) = bounds(&source.position);
+    let tolerance = AT_REST * (high - low).norm() / unit;
+    let moved = |(a, b): (&[f64; 3], &Ride)| {
+        (Vec3::from(*a) - Vec3::from(b.position)).norm() > tolerance || b.rotation[3].abs() < 1.0 - AT_REST
+    };
+    if source.anchor.iter().zip(&now).any(moved) {
+        let what = format!("is 0, but roots are not at their rest pose at frame {}", timeline.first);
         let help = "give it frames to come there from the rest pose: 12 is usual";
         return Err(run.project.shot.error("shot.preroll", what, help).into());
     }
     Ok(())
+}
+
+fn bounds(points: &[[f64; 3]]) -> (Vec3, Vec3) {
+    let start = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
+    points.iter().fold(start, |(low, high), p| (low.inf(&Vec3::from(*p)), high.sup(&Vec3::from(*p))))
 }
 
 /// Roots in metres, each turned the shorter way from where it was.
@@ -352,37 +368,44 @@ fn advance(
     let disk = || Error::disk(&cache);
     let (gravity, wind) = (shot.simulate.gravity.downward(shot.shot.up), shot.simulate.wind.as_ref());
     let (layer, arrival) = (&project.groom.value.layer[running.layer].name, timeline.arrival());
-    let origin = groom::skin(run)?.origin();
-    let mut before = root_rides(run, timeline, &running.source, running.frame)?;
+    let origin = run.origin()?;
+    let colliders = body::colliders(run, body::deforms(timeline))?;
+    let seconds = 1.0 / shot.shot.fps;
+    let position = skin_position(run, timeline, running.frame)?;
+    let mut before = root_rides(run, &running.source, position.as_deref())?;
+    let mut end_before = colliders.end(position.as_deref(), unit);
     let (mut saved, mut saving) = (Instant::now(), 0.0);
+    // Without pre-roll the first frame is the start.
+    if running.frame == timeline.first
+        && k == 0
+        && timeline.preroll == 0
+        && !step.files().any(|f| f.starts_with("frame"))
+    {
+        keep_frame(run, running, step, unit, origin)?;
+        checkpoint(running, step).map_err(disk())?;
+    }
     while running.frame < end {
         let (from, frame) = (running.frame as f64, running.frame + 1);
-        let now = root_rides(run, timeline, &running.source, frame)?;
+        let position = skin_position(run, timeline, frame)?;
+        let now = root_rides(run, &running.source, position.as_deref())?;
+        let end_now = colliders.end(position.as_deref(), unit);
+        let ends_of_skin = end_before.clone().zip(end_now.clone());
+        let moving = ends_of_skin.and_then(|(a, b)| colliders.moving([a, b], seconds));
         let begin = roots(&before, None, unit);
-        let seconds = 1.0 / shot.shot.fps;
-        let arrival_rigid = timeline.rigid(arrival, from).is_some();
-        if arrival_rigid {
-            // A skin that moves as a whole is one solid in its rest coordinates.
-            let rest = groom::skin(run)?;
-            running.skin.go(0, &rest.mesh.position, &positions_of(&begin), seconds);
-        } else {
-            for (f, rides) in [(running.frame, &before), (frame, &now)] {
-                let position = skin_position(run, timeline, f)?;
-                running.skin.go(f, &position, &positions_of(&roots(rides, None, unit)), seconds);
-            }
-        }
         let ends = roots(&now, Some(&begin), unit);
         let motion = |f: f64| timeline.rigid(arrival, from + f).map_or(Rigid::default(), |t| placement(&t, unit));
-        let winds = wind.map(|w| [from, frame as f64].map(|f| blowing(w, f)));
+        let winds = wind.map(|w| [from, frame as f64].map(|f| w.at(f, shot.shot.fps)));
+        let own = colliders.motions(from, unit);
+        let body = colliders.body(&motion, &own, moving.as_ref(), seconds);
         let span = Span {
             seconds,
             time: timeline.seconds(from),
             motion: &motion,
             roots: [&begin, &ends],
-            body: &running.skin.body(&motion, seconds),
+            tips: None,
+            body: &body,
             gravity: [gravity.at(from), gravity.at(frame as f64)],
             wind: winds.as_ref().map(|[a, b]| [a, b]),
-            tips: None,
         };
         let clock = Instant::now();
         let ticker = run.ticker(&format!("{layer} {frame}"));
@@ -390,26 +413,39 @@ fn advance(
         running.frame = frame;
         note(run, layer, frame, &report, step.counts(), clock.elapsed().as_secs_f64());
         if frame >= *timeline.stretch(k).start() {
-            let scene = |p: &[f64; 3]| std::array::from_fn::<f32, 3, _>(|x| (p[x] / unit - origin[x]) as f32);
-            let positions: Vec<[f32; 3]> = running.sim.positions().par_iter().map(scene).collect();
-            step.write(&frame_file(frame), &frame_bytes(frame, &positions)).map_err(disk())?;
-            run.simulated(frame, true);
+            keep_frame(run, running, step, unit, origin)?;
         }
         if frame == end || saved.elapsed().as_secs_f64() * SAVING >= saving {
             let clock = Instant::now();
-            let (name, state) = (state_file(frame), running.sim.save());
-            let bytes = mcap::write_state_payload("state", frame, &state);
-            step.write(&name, &bytes).and_then(|()| step.save("state.", &name)).map_err(disk())?;
+            checkpoint(running, step).map_err(disk())?;
             (saved, saving) = (Instant::now(), clock.elapsed().as_secs_f64());
         }
-        before = now;
+        (before, end_before) = (now, end_now);
     }
     Ok(())
 }
 
-/// The wind at a frame.
-fn blowing(w: &WindSettings, frame: f64) -> Wind {
-    Wind { velocity: w.velocity.vectors().at(frame), ..Wind::default() }
+/// Keeps the frame that the hair has come to.
+fn keep_frame(
+    run: &mut Runner<'_>,
+    running: &Running,
+    step: &mut LongStep,
+    unit: f64,
+    origin: [f64; 3],
+) -> Result<(), Error> {
+    let scene = |p: &[f64; 3]| std::array::from_fn::<f32, 3, _>(|x| (p[x] / unit - origin[x]) as f32);
+    let positions: Vec<[f32; 3]> = running.sim.positions().par_iter().map(scene).collect();
+    let bytes = frame_bytes(running.frame, &positions);
+    step.write(&frame_file(running.frame), &bytes).map_err(Error::disk(&run.project.cache_dir()))?;
+    run.simulated(running.frame, true);
+    Ok(())
+}
+
+/// Keeps the state, from which a run goes on after a kill.
+fn checkpoint(running: &Running, step: &mut LongStep) -> std::io::Result<()> {
+    let name = state_file(running.frame);
+    step.write(&name, &mcap::write_state_payload("state", running.frame, &running.sim.save()))?;
+    step.save("state.", &name)
 }
 
 fn frame_bytes(frame: i64, positions: &[[f32; 3]]) -> Vec<u8> {
@@ -420,7 +456,7 @@ fn frame_bytes(frame: i64, positions: &[[f32; 3]]) -> Vec<u8> {
 }
 
 /// `world = rotation (rest - pivot) + pivot + translation` in metres, without the pivot.
-fn placement(t: &pelage_geom::motion::RigidTransform, unit: f64) -> Rigid {
+pub(super) fn placement(t: &pelage_geom::motion::RigidTransform, unit: f64) -> Rigid {
     let at = t.apply(Vec3::zeros()) * unit;
     Rigid { rotation: t.rotation, translation: at.into() }
 }
@@ -432,7 +468,8 @@ fn note(run: &mut Runner<'_>, layer: &str, frame: i64, r: &SpanReport, counts: &
         *at = n.max(*at);
     };
     most(SLEEPING, r.sleeping);
-    most("points that the mesh pushed out", r.corrected);
+    most("points that the exact mesh pushed out", r.corrected);
+    most("deepest point, micrometres", (r.deepest * 1e6).round() as u64);
     most("strands that took steps of their own", r.subdivided);
     most("largest strain, millionths", (r.largest_strain * 1e6).round() as u64);
     let values = [r.particle_steps, r.teleported, r.held.len() as u64, r.bad_roots.len() as u64];

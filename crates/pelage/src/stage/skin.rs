@@ -30,7 +30,7 @@ pub type SkinPose = Pose;
 impl Skin {
     /// Reads the rest pose of a project.
     pub fn read(project: &Project) -> Result<Self, Error> {
-        Self::from_file(&project.rest)
+        Self::from_file(project.rest.as_ref().expect("a shot with a skin"))
     }
 
     fn from_file(file: &InputFile) -> Result<Self, Error> {

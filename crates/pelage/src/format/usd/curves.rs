@@ -337,6 +337,12 @@ fn read_columns(
     }
     (out.offsets, out.notes) = (columns.offsets, columns.notes);
     place_in_scene(&mut out, &matrix);
+    let odd = out.points.iter().position(|p| !p.iter().all(|x| x.is_finite()));
+    if let Some(i) = odd {
+        let curve = (0..out.offsets.len()).find(|c| out.offsets.range(*c).contains(&i)).unwrap_or(0);
+        let point = i - out.offsets.range(curve).start;
+        return Err(file.bad(format!("curve {curve}, point {point}: not a finite number")));
+    }
     if Bounds::of(&out.points).is_none() || !out.origin.iter().all(|x| x.is_finite()) {
         return Err(file.bad("a point is not a finite number"));
     }
