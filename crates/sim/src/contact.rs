@@ -8,7 +8,7 @@ use crate::Vec3;
 use crate::body::Instant;
 use crate::group::Group;
 use crate::lanes::{LANES, Pack};
-use crate::stage::Contact;
+use crate::stage::{Contact, Motion};
 
 /// Stiffness of contact over a node's inertia m / h^2: the share of a step's approach that is left as depth is one over
 /// this. Below 100, fast approaches end 0.1 mm deep; above 1e6 the matrix loses digits to it.
@@ -28,37 +28,36 @@ const VISIBLE: f64 = 2e-5;
 /// How close points of a group may come to the body.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Keep {
-    /// What each node keeps in the end, metres: the layer's offset, or less where it was groomed closer.
+    /// What each node keeps, metres: the layer's offset, or less where it was groomed closer.
     pub most: Vec<Pack>,
-    /// What it keeps now: less while it comes out from inside.
-    pub now: Vec<Pack>,
+    /// 1 for nodes that were put inside (by the groom, a jump, a hold) and are on their way out.
+    pub inside: Vec<Pack>,
 }
 
 impl Keep {
     /// Distances that nodes keep from now on, from where they are at the beginning.
     pub fn new(g: &Group, body: &Instant<'_, '_>, offset: f64) -> Self {
-        let mut keep = Keep { most: vec![Pack::splat(offset); g.node.len()], now: Vec::new() };
-        keep.now = keep.most.clone();
-        for i in 0..g.node.len() {
-            for l in 0..LANES {
-                if is_free(g, i, l) {
-                    let p = g.x(i, l);
-                    if body.distance_bound(p) < offset {
-                        let d = body.sample(p).distance;
-                        keep.most[i].0[l] = d.clamp(0.0, offset);
-                        keep.now[i].0[l] = d.min(offset);
-                    }
+        let n = g.node.len();
+        let mut keep = Keep { most: vec![Pack::splat(offset); n], inside: vec![Pack::default(); n] };
+        for l in 0..LANES {
+            for i in 0..g.count[l] {
+                if is_free(g, i, l) && body.distance_bound(g.x(i, l)) < offset {
+                    let d = body.sample(g.x(i, l)).distance;
+                    keep.most[i].0[l] = d.clamp(0.0, offset);
+                    keep.inside[i].0[l] = f64::from(u8::from(d < 0.0));
                 }
             }
         }
         keep
     }
 
-    /// Lets points that are inside come out a little.
-    pub fn release(&mut self, seconds: f64) {
-        for (now, most) in self.now.iter_mut().zip(&self.most) {
-            for l in 0..LANES {
-                now.0[l] = (now.0[l] + WAY_OUT * seconds).min(most.0[l]);
+    /// Points of a strand that was carried may be inside now.
+    pub fn carried(g: &mut Group, l: usize, body: &Instant<'_, '_>) {
+        for i in 0..g.count[l] {
+            if is_free(g, i, l) {
+                let p = g.x(i, l);
+                let inside = body.distance_bound(p) < 0.0 && body.sample(p).distance < 0.0;
+                g.keep.inside[i].0[l] = f64::from(u8::from(inside));
             }
         }
     }
@@ -68,8 +67,17 @@ fn is_free(g: &Group, i: usize, l: usize) -> bool {
     g.strand[l].is_some() && g.node[i].held.0[l] == 0.0
 }
 
-/// Finds the contacts of some lanes at the nodes' present positions; false if there are none.
-pub fn find(g: &Group, body: &Instant<'_, '_>, lanes: [bool; LANES], h: f64, contact: &mut [Contact]) -> bool {
+/// Finds the contacts of some lanes at the nodes' present positions; false if there are none. `start` is where nodes were
+/// `elapsed` seconds ago, at the beginning of the step.
+pub fn find(
+    g: &Group,
+    start: &[Motion],
+    body: &Instant<'_, '_>,
+    lanes: [bool; LANES],
+    h: f64,
+    elapsed: f64,
+    contact: &mut [Contact],
+) -> bool {
     let mut any = false;
     for i in 0..g.node.len() {
         for l in 0..LANES {
@@ -79,32 +87,34 @@ pub fn find(g: &Group, body: &Instant<'_, '_>, lanes: [bool; LANES], h: f64, con
                 continue;
             }
             let p = g.x(i, l);
-            let travel = g.v(i, l).norm() * h;
-            let reach = g.keep.now[i].0[l].max(0.0) + NEAR + 0.5 * travel;
-            if body.distance_bound(p) > reach {
-                c.force.0[l] = 0.0;
+            let most = g.keep.most[i].0[l];
+            let reach = most + NEAR + 0.5 * h * g.v(i, l).norm();
+            let near = body.distance_bound(p) <= reach;
+            let Some(hit) = near.then(|| body.sample(p)).filter(|hit| hit.distance < reach) else {
+                (c.force.0[l], c.drag.0[l]) = (0.0, 0.0);
                 continue;
-            }
-            let hit = body.sample(p);
-            if !(hit.distance < reach) {
-                c.force.0[l] = 0.0;
-                continue;
-            }
+            };
             any = true;
-            let level = hit.normal.dot(&p) - hit.distance + g.keep.now[i].0[l];
+            let mut keep = most;
+            if g.keep.inside[i].0[l] > 0.0 {
+                // Where it was before the step, from the same plane; it may come out a little from there.
+                let x = &start[i].x;
+                let moved = p - Vec3::new(x[0].0[l], x[1].0[l], x[2].0[l]);
+                let before = hit.distance - hit.normal.dot(&(moved - hit.velocity * elapsed));
+                keep = most.min(before + WAY_OUT * elapsed);
+            }
+            c.level.0[l] = hit.normal.dot(&p) - hit.distance + keep;
             for k in 0..3 {
                 c.normal[k].0[l] = hit.normal[k];
                 c.velocity[k].0[l] = hit.velocity[k];
             }
-            c.level.0[l] = level;
             c.stiffness.0[l] = STIFFNESS * g.node[i].mass.0[l] / (h * h);
         }
     }
     any
 }
 
-/// After a step: no bounce (the relative normal velocity of touching points is 0, not outward), and points that are
-/// still inside may stay there for now.
+/// After a step: no bounce (the relative normal velocity of touching points is 0, not outward).
 pub fn settle(g: &mut Group, contact: &[Contact], lanes: [bool; LANES]) {
     for i in 0..g.node.len() {
         for l in 0..LANES {
@@ -114,10 +124,6 @@ pub fn settle(g: &mut Group, contact: &[Contact], lanes: [bool; LANES]) {
             }
             let n = Vec3::new(c.normal[0].0[l], c.normal[1].0[l], c.normal[2].0[l]);
             let surface = Vec3::new(c.velocity[0].0[l], c.velocity[1].0[l], c.velocity[2].0[l]);
-            let depth = c.level.0[l] - n.dot(&g.x(i, l));
-            if depth > 0.0 {
-                g.keep.now[i].0[l] -= depth;
-            }
             let away = n.dot(&(g.v(i, l) - surface));
             if away > 0.0 {
                 for k in 0..3 {
@@ -130,7 +136,7 @@ pub fn settle(g: &mut Group, contact: &[Contact], lanes: [bool; LANES]) {
 }
 
 /// At the end of a span: points that the exact mesh has inside come out to its surface, but not those that are on their
-/// way out. Returns how many were moved, and how deep the deepest was that stays.
+/// way out. Returns how many were moved, and how deep the deepest is that stays.
 pub fn correct(g: &mut Group, body: &Instant<'_, '_>) -> (u64, f64) {
     let (mut moved, mut deepest) = (0, 0.0f64);
     for i in 0..g.node.len() {
@@ -139,12 +145,13 @@ pub fn correct(g: &mut Group, body: &Instant<'_, '_>) -> (u64, f64) {
                 continue;
             }
             let p = g.x(i, l);
-            let Some(hit) = body.exact(p, 0.0) else { continue };
-            if g.keep.now[i].0[l] < -VISIBLE {
-                deepest = deepest.max(-hit.distance);
+            let Some(hit) = body.exact(p, 0.0) else {
+                g.keep.inside[i].0[l] = 0.0;
                 continue;
-            }
-            if hit.distance < -VISIBLE {
+            };
+            if g.keep.inside[i].0[l] > 0.0 {
+                deepest = deepest.max(-hit.distance);
+            } else if hit.distance < -VISIBLE {
                 moved += 1;
                 let to = p - hit.normal * hit.distance;
                 let inward = hit.normal.dot(&(g.v(i, l) - hit.velocity)).min(0.0);

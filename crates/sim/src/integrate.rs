@@ -87,9 +87,20 @@ pub trait Around {
     /// Whether there is a body.
     fn solid(&self) -> bool;
     /// Fills in contacts at the nodes' present positions; false if there are none.
-    fn touch(&self, group: &Group, lanes: [bool; LANES], fraction: f64, h: f64, contact: &mut [Contact]) -> bool;
+    fn touch(&self, group: &Group, start: &[Motion], lanes: [bool; LANES], time: StageTime, contact: &mut [Contact]) -> bool;
     /// Fills in the air at the nodes of some lanes; false if it does not act.
     fn air(&self, group: &Group, lanes: [bool; LANES], fraction: f64, air: &mut [Air]) -> bool;
+}
+
+/// When a stage is.
+#[derive(Clone, Copy, Debug)]
+pub struct StageTime {
+    /// Fraction of the span.
+    pub fraction: f64,
+    /// Length of the implicit step, seconds.
+    pub h: f64,
+    /// Since the beginning of the step, seconds.
+    pub elapsed: f64,
 }
 
 /// What a group did.
@@ -138,7 +149,7 @@ pub fn advance<A: Around>(
     let now: [bool; LANES] = std::array::from_fn(|l| wanted[l] && !deeper[l]);
     if now.contains(&true) {
         let saved = save(g, work, depth);
-        let converged = step(g, around, method, at, now, work, done);
+        let converged = step(g, around, method, at, now, &saved, work, done);
         let seen = look(g, method, &saved);
         for l in 0..LANES {
             let finite = seen.finite.0[l] == 0.0;
@@ -211,6 +222,7 @@ fn save(g: &Group, work: &mut Work, depth: u8) -> Vec<Motion> {
     saved
 }
 
+#[allow(clippy::too_many_arguments)]
 /// Both stages; returns the lanes that converged.
 fn step<A: Around>(
     g: &mut Group,
@@ -218,6 +230,7 @@ fn step<A: Around>(
     method: &Method,
     at: Interval,
     lanes: [bool; LANES],
+    before: &[Motion],
     work: &mut Work,
     done: &mut Done,
 ) -> [bool; LANES] {
@@ -241,8 +254,10 @@ fn step<A: Around>(
         let Work { y, base, from, .. } = work;
         lanes::run(method.width, Predict { motion: &mut g.motion, y, base, from, h, rest, gravity, second });
         around.hold(g, lanes, fraction);
-        prescribe(g, work, &start, h, (fraction - at.start) * at.span);
-        let touching = around.solid() && around.touch(g, lanes, fraction, h, &mut work.contact);
+        let elapsed = (fraction - at.start) * at.span;
+        prescribe(g, work, &start, h, elapsed);
+        let time = StageTime { fraction, h, elapsed };
+        let touching = around.solid() && around.touch(g, before, lanes, time, &mut work.contact);
         let acting = Acting { h, since, touching, blowing };
         let stage_ok = solve(g, method, acting, lanes, work, done);
         touched |= touching;

@@ -3,11 +3,11 @@
 use crate::contact::{self, Keep};
 use crate::drag;
 use crate::group::{Group, Strand};
-use crate::integrate::{self, Around, Done, Interval, Method, Work};
+use crate::integrate::{self, Around, Done, Interval, Method, StageTime, Work};
 use crate::lanes::{LANES, Pack, Width};
 use crate::rod::{self, Damping};
 use crate::settle;
-use crate::stage::{Air, Contact};
+use crate::stage::{self, Air, Contact};
 use crate::wind::Surface;
 use crate::{Body, Motion, Rigid, Vec3, Wind};
 use pelage_geom::{Offsets, StrandId};
@@ -533,7 +533,7 @@ impl Simulation {
                     out.extend([&m.x, &m.v, &m.a, &m.m].into_iter().flatten().map(|p| p.0[l]));
                     // Not a number before the first span.
                     let keep = |p: &[Pack]| p.get(i).map_or(f64::NAN, |p| p.0[l]);
-                    out.extend([keep(&g.keep.most), keep(&g.keep.now)]);
+                    out.extend([keep(&g.keep.most), keep(&g.keep.inside)]);
                 }
             }
         }
@@ -562,12 +562,12 @@ impl Simulation {
                     for p in [&mut m.x, &mut m.v, &mut m.a, &mut m.m].into_iter().flatten() {
                         p.0[l] = next();
                     }
-                    let (most, now) = (next(), next());
+                    let (most, inside) = (next(), next());
                     if most.is_nan() {
                         g.keep = Keep::default();
                     } else {
                         let n = g.node.len();
-                        for (keep, value) in [(&mut g.keep.most, most), (&mut g.keep.now, now)] {
+                        for (keep, value) in [(&mut g.keep.most, most), (&mut g.keep.inside, inside)] {
                             keep.resize(n, Pack::default());
                             keep[i].0[l] = value;
                         }
@@ -610,6 +610,7 @@ fn move_group(g: &mut Group, scene: &Scene<'_>, method: &Method, steps: u32, wor
         if jump > scene.settings.teleport {
             done.teleported[l] = true;
             g.carry(l, &from, &to);
+            Keep::carried(g, l, &scene.span.body.at(1.0));
         } else if scene.calm && scene.settings.sleep && g.quiet[l] >= 2 && from == to {
             done.asleep[l] = true;
         } else {
@@ -620,9 +621,6 @@ fn move_group(g: &mut Group, scene: &Scene<'_>, method: &Method, steps: u32, wor
         let length = 1.0 / f64::from(steps);
         let at = Interval { start: f64::from(k) * length, length, span: scene.span.seconds };
         integrate::advance(g, scene, method, at, lanes, 0, work, &mut done.done);
-        if scene.solid() {
-            g.keep.release(length * scene.span.seconds);
-        }
     }
     for l in 0..LANES {
         let Some(s) = g.strand[l] else { continue };
@@ -631,6 +629,7 @@ fn move_group(g: &mut Group, scene: &Scene<'_>, method: &Method, steps: u32, wor
             g.revert(l, &saved);
             g.carry(l, &scene.root(s, 0.0), &scene.root(s, 1.0));
             g.stop(l);
+            Keep::carried(g, l, &scene.span.body.at(1.0));
         }
         if lanes[l] {
             let still = scene.calm && done.done.speed[l] < SLEEP_SPEED;
@@ -755,8 +754,15 @@ impl Around for Scene<'_> {
         !self.span.body.parts.is_empty()
     }
 
-    fn touch(&self, g: &Group, lanes: [bool; LANES], fraction: f64, h: f64, contact: &mut [Contact]) -> bool {
-        contact::find(g, &self.span.body.at(fraction), lanes, h, contact)
+    fn touch(
+        &self,
+        g: &Group,
+        start: &[stage::Motion],
+        lanes: [bool; LANES],
+        time: StageTime,
+        contact: &mut [Contact],
+    ) -> bool {
+        contact::find(g, start, &self.span.body.at(time.fraction), lanes, time.h, time.elapsed, contact)
     }
 
     fn air(&self, g: &Group, lanes: [bool; LANES], fraction: f64, air: &mut [Air]) -> bool {
