@@ -68,10 +68,11 @@ impl Kernel for Step<'_> {
             *r = [Pack::default(); 3];
         }
         for j in (0..n).rev() {
-            let d = band::substitute::<L, 3, 12>(j, &self.factor[j], self.rhs);
+            band::substitute::<L, 3, 12>(j, &self.factor[j], self.rhs);
             for c in 0..3 {
-                (L::load(&x[j][c]) + d[c]).store(&mut x[j][c]);
-                (d[c] * inverse).store(&mut v[j][c]);
+                let d = L::load(&self.rhs[j][c]);
+                (L::load(&x[j][c]) + d).store(&mut x[j][c]);
+                (d * inverse).store(&mut v[j][c]);
             }
         }
     }

@@ -87,7 +87,14 @@ pub trait Around {
     /// Whether there is a body.
     fn solid(&self) -> bool;
     /// Fills in contacts at the nodes' present positions; false if there are none.
-    fn touch(&self, group: &Group, start: &[Motion], lanes: [bool; LANES], time: StageTime, contact: &mut [Contact]) -> bool;
+    fn touch(
+        &self,
+        group: &Group,
+        start: &[Motion],
+        lanes: [bool; LANES],
+        time: StageTime,
+        contact: &mut [Contact],
+    ) -> bool;
     /// Fills in the air at the nodes of some lanes; false if it does not act.
     fn air(&self, group: &Group, lanes: [bool; LANES], fraction: f64, air: &mut [Air]) -> bool;
 }
@@ -248,9 +255,16 @@ fn step<A: Around>(
     let (mut converged, mut touched) = (lanes, false);
     let start = held_positions(g);
     let blowing = around.air(g, lanes, at.start, &mut work.air);
-    for (second, fraction, since) in [(false, at.start + GAMMA * at.length, h), (true, at.start + at.length, dt - h)] {
+    work.turned.fill(Pack::default());
+    for (second, fraction) in [(false, at.start + GAMMA * at.length), (true, at.start + at.length)] {
         let gravity = around.gravity(fraction);
         let rest = dt - h;
+        if second {
+            // Turns count from where the first stage's rate would have brought them, as positions do from `base`.
+            for t in &mut work.turned {
+                t.0 = t.0.map(|t| t * (1.0 - (1.0 - GAMMA) / GAMMA));
+            }
+        }
         let Work { y, base, from, .. } = work;
         lanes::run(method.width, Predict { motion: &mut g.motion, y, base, from, h, rest, gravity, second });
         around.hold(g, lanes, fraction);
@@ -258,7 +272,7 @@ fn step<A: Around>(
         prescribe(g, work, &start, h, elapsed);
         let time = StageTime { fraction, h, elapsed };
         let touching = around.solid() && around.touch(g, before, lanes, time, &mut work.contact);
-        let acting = Acting { h, since, touching, blowing };
+        let acting = Acting { h, touching, blowing };
         let stage_ok = solve(g, method, acting, lanes, work, done);
         touched |= touching;
         for l in 0..LANES {
@@ -306,7 +320,6 @@ fn prescribe(g: &Group, work: &mut Work, start: &[[Pack; 3]], h: f64, elapsed: f
 #[derive(Clone, Copy)]
 struct Acting {
     h: f64,
-    since: f64,
     touching: bool,
     blowing: bool,
 }
@@ -320,14 +333,12 @@ fn solve(
     work: &mut Work,
     done: &mut Done,
 ) -> [bool; LANES] {
-    let Acting { h, since, touching, blowing } = acting;
-    work.turned.fill(Pack::default());
+    let Acting { h, touching, blowing } = acting;
     let mut active = lanes;
     let mut last = Pack::splat(FIRST_TURN);
     for iteration in 0..ITERATIONS {
         let stage = Stage {
             h,
-            since,
             y: &work.y,
             base: &work.base,
             contact: touching.then_some(&mut work.contact),

@@ -205,7 +205,6 @@ impl Kernel for Gradient<'_> {
         // A step so long that inertia vanishes.
         let mut stage = Stage {
             h: 1e30,
-            since: 1e30,
             y: self.still,
             base: self.still,
             contact: None,

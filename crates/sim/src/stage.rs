@@ -75,8 +75,6 @@ pub struct Air {
 pub struct Stage<'a> {
     /// Length of the implicit step, seconds.
     pub h: f64,
-    /// Time since the last stage, seconds.
-    pub since: f64,
     /// Free flight: where inertia alone would carry each node.
     pub y: &'a [[Pack; 3]],
     /// Origin of velocities: `v = (x - base) / h`.
