@@ -68,7 +68,7 @@ pub fn is_free(g: &Group, i: usize, l: usize) -> bool {
     g.strand[l].is_some() && g.node[i].held.0[l] == 0.0 && g.node[i].share.0[l] > 0.0
 }
 
-/// Finds the contacts of some lanes at the nodes' present positions; false if there are none. `start` is where nodes were
+/// Finds the contacts of some lanes at the nodes' present positions; the lanes that have some. `start` is where nodes were
 /// `elapsed` seconds ago, at the beginning of the step.
 pub fn find(
     g: &Group,
@@ -78,8 +78,8 @@ pub fn find(
     h: f64,
     elapsed: f64,
     contact: &mut [Contact],
-) -> bool {
-    let mut any = false;
+) -> [bool; LANES] {
+    let mut any = [false; LANES];
     for i in 0..g.node.len() {
         for l in 0..LANES {
             let c = &mut contact[i];
@@ -95,7 +95,7 @@ pub fn find(
                 (c.force.0[l], c.drag.0[l]) = (0.0, 0.0);
                 continue;
             };
-            any = true;
+            any[l] = true;
             let mut keep = most;
             if g.keep.inside[i].0[l] > 0.0 {
                 // Where it was before the step, from the same plane; it may come out a little from there.
@@ -117,6 +117,7 @@ pub fn find(
 
 /// After a step: no bounce (the relative normal velocity of touching points is 0, not outward).
 pub fn settle(g: &mut Group, contact: &[Contact], lanes: [bool; LANES]) {
+    let mut touching = [false; LANES];
     for i in 0..g.node.len() {
         for l in 0..LANES {
             let c = &contact[i];
@@ -129,10 +130,14 @@ pub fn settle(g: &mut Group, contact: &[Contact], lanes: [bool; LANES]) {
             if away > 0.0 {
                 for k in 0..3 {
                     g.motion[i].v[k].0[l] -= away * n[k];
-                    g.motion[i].a[k].0[l] = 0.0;
                 }
             }
+            touching[l] = true;
         }
+    }
+    // What an impact did to the acceleration must not be done again.
+    for l in (0..LANES).filter(|&l| touching[l]) {
+        g.forget_acceleration(l);
     }
 }
 

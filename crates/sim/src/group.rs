@@ -206,7 +206,8 @@ impl Group {
             node.mass.0[lane] = 1.0;
             node.held.0[lane] = HELD;
             node.held_turn.0[lane] = HELD;
-            node.length.0[lane] = 1.0;
+            // So long that movement over it is nothing.
+            node.length.0[lane] = 1e30;
             self.motion[i].x[0].0[lane] = from.x + i as f64;
             self.motion[i].x[1].0[lane] = from.y;
             self.motion[i].x[2].0[lane] = from.z;
@@ -306,6 +307,15 @@ impl Group {
             }
             for c in 0..3 {
                 m.x[c].0[lane] = x[c];
+            }
+        }
+    }
+
+    /// The last acceleration of a strand that was moved by hand says nothing.
+    pub fn forget_acceleration(&mut self, lane: usize) {
+        for m in &mut self.motion[..self.count[lane]] {
+            for p in &mut m.a {
+                p.0[lane] = 0.0;
             }
         }
     }

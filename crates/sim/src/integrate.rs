@@ -1,8 +1,10 @@
 //! The step in time.
 //!
-//! SDIRK2 (R. Alexander, "Diagonally implicit Runge-Kutta methods for stiff ODE's", 1977): two implicit stages of length
-//! `gamma dt`, gamma = 1 - 1/sqrt 2. It is of second order, damps what it can't resolve (L-stable), needs no history, so
-//! that a strand may change its step at any time, and both stages are the minimisation of [`crate::stage`].
+//! TR-BDF2 (R. E. Bank et al., "Transient simulation of silicon devices and circuits", 1985): a trapezoidal stage to the
+//! fraction 2 - sqrt 2 of the step, then a second-order backward difference to its end. Both are implicit steps of the
+//! length `gamma dt`, gamma = 1 - 1/sqrt 2, the minimisation of [`crate::stage`]. It is of second order also where stretching
+//! is stiff, and damps what it can't resolve (L-stable). It needs the acceleration at the beginning; a strand that has none
+//! to trust takes SDIRK2, with the same implicit steps. No other history, so a strand may change its step at any time.
 //!
 //! A strand whose stage does not converge, or that turns too far in a step, takes that step in two halves, and so on; it
 //! alone, so no hair changes another.
@@ -19,8 +21,17 @@ use crate::stage::{Air, Contact, Motion, Stage, open_node};
 /// The fraction of a step that each stage spans: 1 - 1 / sqrt 2.
 const GAMMA: f64 = 0.292_893_218_813_452_5;
 
+/// Weight of both earlier derivatives in the last stage of TR-BDF2: sqrt 2 / 4.
+const WEIGHT: f64 = 0.353_553_390_593_273_8;
+
+/// What the last stage of TR-BDF2 takes from the first stage's movement: (1 - c)^2 / (c (2 - c)), c = 2 - sqrt 2.
+const TURN_CARRIED: f64 = 0.207_106_781_186_547_5;
+
 /// Most halvings of a step. Each doubles the work of that strand only.
 pub const DEEPEST: u8 = 6;
+
+/// A step of the deepest level whose iterations still turn an edge by this, radians, has diverged: the strand is held.
+const LOOSE: f64 = 0.1;
 
 /// Iterations of a stage before its step is halved.
 const ITERATIONS: usize = 8;
@@ -29,8 +40,9 @@ const ITERATIONS: usize = 8;
 /// shows it; below 1e-3, strands halve their steps for nothing.
 const CONTACT_TOLERANCE: f64 = 1e-2;
 
-/// Iterations in which friction follows. With one, hair sticks and slips a stage late; with many, some never settle.
-const FRICTION_ITERATIONS: usize = 2;
+/// Iterations in which friction follows: the first, with the normal forces of the last stage, and the third, with those of
+/// the second's positions. With the first only, hair sticks and slips a stage late; with many, some never settles.
+const FRICTION_ITERATIONS: [usize; 2] = [0, 2];
 
 /// The first iteration counts as well converged if it turns less than this times the tolerance's root, radians: what the
 /// guess from the last acceleration leaves. Larger, errors of fast motion stay; smaller, calm hair iterates twice.
@@ -61,6 +73,8 @@ pub struct Work {
     springs: Scratch<3, 12>,
     x: Vec<[Pack; 3]>,
     straight: Scratch<3, 9>,
+    /// Turn of each lane's last iteration, radians.
+    left: Pack,
 }
 
 impl Work {
@@ -97,7 +111,7 @@ pub trait Around {
     fn gravity(&self, fraction: f64) -> [f64; 3];
     /// Whether there is a body.
     fn solid(&self) -> bool;
-    /// Fills in contacts at the nodes' present positions; false if there are none.
+    /// Fills in contacts at the nodes' present positions; the lanes that have some.
     fn touch(
         &self,
         group: &Group,
@@ -105,7 +119,7 @@ pub trait Around {
         lanes: [bool; LANES],
         time: StageTime,
         contact: &mut [Contact],
-    ) -> bool;
+    ) -> [bool; LANES];
     /// Fills in the air at the nodes of some lanes; false if it does not act.
     fn air(&self, group: &Group, lanes: [bool; LANES], fraction: f64, air: &mut [Air]) -> bool;
 }
@@ -167,16 +181,18 @@ pub fn advance<A: Around>(
     let now: [bool; LANES] = std::array::from_fn(|l| wanted[l] && !deeper[l]);
     if now.contains(&true) {
         let saved = save(g, work, depth);
-        let converged = step(g, around, method, at, now, &saved.motion, work, done);
+        let converged = step_each(g, around, method, at, now, &saved, work, done);
         let seen = look(g, method, &saved.motion);
         for l in 0..LANES {
             let finite = seen.finite.0[l] == 0.0;
             let calm = converged[l] && finite && seen.turn.0[l] <= method.largest_turn * method.largest_turn;
-            if now[l] && (calm || (depth == DEEPEST && finite)) {
+            let settled = converged[l] || work.left.0[l] < LOOSE;
+            if now[l] && (calm || (depth == DEEPEST && finite && settled)) {
                 done.deepest[l] = done.deepest[l].max(depth);
                 done.strain[l] = seen.strain.0[l];
                 if seen.strain.0[l] > method.strain_limit && g.springs.is_none() {
                     limit_strain(g, l, method.strain_limit, at.length * at.span);
+                    g.forget_acceleration(l);
                     done.strain[l] = method.strain_limit;
                     done.limited += 1;
                 }
@@ -246,6 +262,42 @@ fn save(g: &Group, work: &mut Work, depth: u8) -> Snapshot {
     saved
 }
 
+/// A step of strands that know their acceleration, and of those that do not (at the start, in contact, after limiting):
+/// these take SDIRK2 (R. Alexander 1977), which needs none. Returns the lanes that converged.
+#[allow(clippy::too_many_arguments)]
+fn step_each<A: Around>(
+    g: &mut Group,
+    around: &A,
+    method: &Method,
+    at: Interval,
+    lanes: [bool; LANES],
+    saved: &Snapshot,
+    work: &mut Work,
+    done: &mut Done,
+) -> [bool; LANES] {
+    let unknown = |l: usize| g.motion[..g.count[l]].iter().all(|m| m.a.iter().all(|a| a.0[l] == 0.0));
+    let cold: [bool; LANES] = std::array::from_fn(|l| lanes[l] && unknown(l));
+    let warm: [bool; LANES] = std::array::from_fn(|l| lanes[l] && !cold[l]);
+    if !cold.contains(&true) {
+        return step(g, around, method, at, warm, false, &saved.motion, work, done);
+    }
+    let mut converged = step(g, around, method, at, cold, true, &saved.motion, work, done);
+    if warm.contains(&true) {
+        let kept = (g.motion.clone(), g.springs.as_ref().map_or(Vec::new(), |s| s.altitude.clone()));
+        for l in (0..LANES).filter(|&l| !cold[l]) {
+            g.revert(l, &saved.motion, &saved.altitude);
+        }
+        let others = step(g, around, method, at, warm, false, &saved.motion, work, done);
+        for l in 0..LANES {
+            if cold[l] {
+                g.revert(l, &kept.0, &kept.1);
+            }
+            converged[l] |= others[l];
+        }
+    }
+    converged
+}
+
 #[allow(clippy::too_many_arguments)]
 /// Both stages; returns the lanes that converged.
 fn step<A: Around>(
@@ -254,6 +306,7 @@ fn step<A: Around>(
     method: &Method,
     at: Interval,
     lanes: [bool; LANES],
+    cold: bool,
     before: &[Motion],
     work: &mut Work,
     done: &mut Done,
@@ -275,35 +328,41 @@ fn step<A: Around>(
         work.straight.reserve(n);
     }
     let h = GAMMA * dt;
-    let (mut converged, mut touched) = (lanes, false);
+    let (mut converged, mut touched) = (lanes, [false; LANES]);
+    let first = if cold { GAMMA } else { 2.0 * GAMMA };
+    let carried = if cold { 1.0 - (1.0 - GAMMA) / GAMMA } else { -TURN_CARRIED };
     let blowing = around.air(g, lanes, at.start, &mut work.air);
+    for l in (0..LANES).filter(|&l| lanes[l]) {
+        work.left.0[l] = 0.0;
+    }
     work.turned.fill(Pack::default());
-    for (second, fraction) in [(false, at.start + GAMMA * at.length), (true, at.start + at.length)] {
+    for (second, fraction) in [(false, at.start + first * at.length), (true, at.start + at.length)] {
         let gravity = around.gravity(fraction);
         let rest = dt - h;
         if second {
             // Turns count from where the first stage's rate would have brought them, as positions do from `base`.
             for t in &mut work.turned {
-                t.0 = t.0.map(|t| t * (1.0 - (1.0 - GAMMA) / GAMMA));
+                t.0 = t.0.map(|t| t * carried);
             }
         }
         let Work { y, base, from, .. } = work;
-        lanes::run(method.width, Predict { motion: &mut g.motion, y, base, from, h, rest, gravity, second });
+        lanes::run(method.width, Predict { motion: &mut g.motion, y, base, from, h, rest, gravity, second, cold, dt });
         around.hold(g, lanes, fraction);
         let elapsed = (fraction - at.start) * at.span;
         prescribe(g, work, before, h, elapsed);
         let time = StageTime { fraction, h, elapsed };
-        let touching = around.solid() && around.touch(g, before, lanes, time, &mut work.contact);
+        let touching =
+            if around.solid() { around.touch(g, before, lanes, time, &mut work.contact) } else { [false; LANES] };
         let acting = Acting { h, touching, blowing };
         let stage_ok = solve(g, method, acting, lanes, work, done);
-        touched |= touching;
         for l in 0..LANES {
+            touched[l] |= touching[l];
             converged[l] &= stage_ok[l];
         }
     }
     let Work { base, from, .. } = work;
     lanes::run(method.width, Finish { motion: &mut g.motion, base, from, h });
-    if touched {
+    if touched.contains(&true) {
         contact::settle(g, &work.contact, lanes);
     }
     let count: usize = (0..LANES).filter(|&l| lanes[l]).map(|l| g.count[l]).sum();
@@ -335,7 +394,7 @@ fn prescribe(g: &Group, work: &mut Work, before: &[Motion], h: f64, elapsed: f64
 #[derive(Clone, Copy)]
 struct Acting {
     h: f64,
-    touching: bool,
+    touching: [bool; LANES],
     blowing: bool,
 }
 
@@ -356,9 +415,10 @@ fn solve(
             h,
             y: &work.y,
             base: &work.base,
-            contact: touching.then_some(&mut work.contact),
+            contact: touching.contains(&true).then_some(&mut work.contact),
             friction: method.friction,
-            refresh: iteration < FRICTION_ITERATIONS,
+            refresh: FRICTION_ITERATIONS.contains(&iteration),
+            solved: iteration > 0,
             air: blowing.then_some(&work.air),
             active: mask(active),
         };
@@ -378,7 +438,7 @@ fn solve(
                 let turn = largest.0[l].sqrt();
                 let ratio = (turn / last.0[l]).min(SLOWEST);
                 // What later iterations would still turn, if each turned by the same fraction of the one before.
-                active[l] = turn * ratio > method.tolerance * (1.0 - ratio) || (touching && iteration == 0);
+                active[l] = turn * ratio > method.tolerance * (1.0 - ratio) || (touching[l] && iteration < 2);
                 last.0[l] = turn;
             }
         }
@@ -386,8 +446,11 @@ fn solve(
             break;
         }
     }
+    for l in (0..LANES).filter(|&l| lanes[l]) {
+        work.left.0[l] = work.left.0[l].max(last.0[l]);
+    }
     // Points that come and go at the body may swing around the tolerance: close is enough there.
-    std::array::from_fn(|l| !active[l] || (touching && last.0[l] < CONTACT_TOLERANCE))
+    std::array::from_fn(|l| !active[l] || (touching[l] && last.0[l] < CONTACT_TOLERANCE))
 }
 
 /// One iteration of a rod.
@@ -519,6 +582,8 @@ struct Predict<'a> {
     rest: f64,
     gravity: [f64; 3],
     second: bool,
+    cold: bool,
+    dt: f64,
 }
 
 impl Kernel for Predict<'_> {
@@ -532,14 +597,24 @@ impl Kernel for Predict<'_> {
         let fall: L3<L> = [L::splat(x), L::splat(y), L::splat(z)];
         for (i, m) in self.motion.iter_mut().enumerate() {
             let x = load3::<L>(&m.x);
-            let (base, from, a) = if self.second {
+            let (vn, an) = (load3::<L>(&m.v), load3::<L>(&m.a));
+            let w = L::splat(self.dt * WEIGHT);
+            let (base, from, a) = if !self.cold && self.second {
+                let (b1, f1) = (load3::<L>(&self.base[i]), load3::<L>(&self.from[i]));
+                let v1 = scale3(sub3(x, b1), inverse);
+                let a1 = scale3(sub3(v1, f1), inverse);
+                let xn = mul_add3(vn, -h, b1);
+                (mul_add3(lanes::add3(vn, v1), w, xn), mul_add3(lanes::add3(an, a1), w, vn), a1)
+            } else if !self.cold {
+                (mul_add3(vn, h, x), mul_add3(an, h, vn), an)
+            } else if self.second {
                 let start = load3::<L>(&self.base[i]);
                 let before = load3::<L>(&self.from[i]);
                 let v = scale3(sub3(x, start), inverse);
                 let a = scale3(sub3(v, before), inverse);
                 (mul_add3(v, rest, start), mul_add3(a, rest, before), a)
             } else {
-                (x, load3(&m.v), load3(&m.a))
+                (x, vn, an)
             };
             store3(mul_add3(mul_add3(fall, h, from), h, base), &mut self.y[i]);
             store3(mul_add3(mul_add3(a, h, from), h, base), &mut m.x);

@@ -587,7 +587,10 @@ pub fn apply<L: Lanes, const D: usize, const ROWS: usize>(
             let m = mul_add3(cross(e1.t, m), sine, scale3(m, cosine));
             let m = neg_mul_add3(e1.t, dot(e1.t, m), m);
             let inverse = one / dot(m, m).max(L::splat(1e-60)).sqrt();
-            store3(scale3(m, inverse), &mut motion[j - 1].m);
+            let (was, now) = (load3::<L>(&motion[j - 1].m), scale3(m, inverse));
+            // Strands that are done keep every bit, however long their neighbours take.
+            let keep = |c: usize| L::if_gt(scale, zero, now[c], was[c]);
+            store3([keep(0), keep(1), keep(2)], &mut motion[j - 1].m);
         }
         (old, new) = (old_next, new_next);
     }
@@ -696,7 +699,7 @@ pub fn watch<L: Lanes>(nodes: &[Node], elastic: &[Elastic], before: &[Motion], a
             let s = cross(e0.t, e1.t);
             // An edge that turned by more than a right angle has a small sine again.
             let large = L::if_gt(zero, dot(e0.t, e1.t), L::splat(4.0), dot(s, s));
-            turn = large.max(turn);
+            turn = L::if_gt(L::load(&elastic[i].stretch), zero, large, zero).max(turn);
             let rest = L::load(&nodes[i].length);
             let stretched = (e1.length - rest) / rest;
             let real = L::if_gt(L::load(&elastic[i].stretch), zero, stretched.max(-stretched), zero);

@@ -177,6 +177,17 @@ fn unstable(group: &Group, width: Width) -> [bool; LANES] {
     let mut tangent: Vec<Column<4, 11>> = vec![[[Pack::default(); 4]; 11]; n];
     let mut scratch = Scratch::<4, 11>::default();
     scratch.reserve(n);
+    // Near the origin, or differences drown in rounding.
+    let mut near = group.clone();
+    for l in 0..LANES {
+        let from = near.x(0, l);
+        for m in &mut near.motion {
+            for c in 0..3 {
+                m.x[c].0[l] -= from[c];
+            }
+        }
+    }
+    let group = &near;
     let mut moved = group.clone();
     let still: Vec<[Pack; 3]> = vec![[Pack::default(); 3]; n];
     for colour in 0..COLOURS.min(n) {
@@ -208,7 +219,9 @@ fn unstable(group: &Group, width: Width) -> [bool; LANES] {
 
 /// Size of an unknown: the edge's length, or 1 radian.
 fn unit(group: &Group, j: usize, l: usize, c: usize) -> f64 {
-    if c == 3 { 1.0 } else { group.node[j.min(group.node.len() - 2)].length.0[l] }
+    // A tip has no edge ahead.
+    let edge = if j > 0 && group.elastic[j].stretch.0[l] == 0.0 { j - 1 } else { j };
+    if c == 3 { 1.0 } else { group.node[edge].length.0[l].min(1.0) }
 }
 
 /// Moves every node of a colour along one unknown.
@@ -259,6 +272,7 @@ impl Kernel for Gradient<'_> {
             contact: None,
             friction: 0.0,
             refresh: false,
+            solved: false,
             air: None,
             active: Pack::splat(1.0),
         };

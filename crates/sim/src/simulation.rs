@@ -795,7 +795,7 @@ impl Around for Scene<'_> {
         lanes: [bool; LANES],
         time: StageTime,
         contact: &mut [Contact],
-    ) -> bool {
+    ) -> [bool; LANES] {
         contact::find(g, start, &self.span.body.at(time.fraction), lanes, time.h, time.elapsed, contact)
     }
 

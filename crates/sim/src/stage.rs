@@ -88,6 +88,8 @@ pub struct Stage<'a> {
     /// Whether friction follows the last iteration's normal force and sliding; else it stays as it was, so that later
     /// iterations converge.
     pub refresh: bool,
+    /// Whether positions are those of a solve, so that depths are forces; those of a guess may be far too deep.
+    pub solved: bool,
     /// Air, if it acts.
     pub air: Option<&'a [Air]>,
     /// Lanes that still move: 1 or 0.
@@ -150,7 +152,9 @@ pub fn open_node<L: Lanes, const D: usize, const ROWS: usize>(
             (L::splat(stage.friction) * L::load(&contact.force) / speed).store(&mut contact.drag);
         }
         let drag = L::if_gt(depth, zero, L::load(&contact.drag), zero);
-        force.store(&mut contact.force);
+        if stage.solved {
+            force.store(&mut contact.force);
+        }
         for r in 0..3 {
             b[r] = drag.neg_mul_add(slide[r], force.mul_add(n[r], b[r]));
             p.0[r][r] = drag.mul_add(inverse_h, p.0[r][r]);
