@@ -112,7 +112,7 @@ fn violent_skins(calms: bool) {
                 let what = format!("{model:?} {name} {seconds} {substeps:?}");
                 let settings = Settings { model, substeps, ..Settings::default() };
                 let mut shot = Shot::new(&hairs, &settings, GRAVITY);
-                let count = (0.5 / seconds).ceil() as usize;
+                let count = (0.2 / seconds).ceil() as usize;
                 for _ in 0..count {
                     let t = shot.time;
                     shot.go(seconds, &move |f| skin(t + f * seconds), &Body::default(), None);
@@ -239,26 +239,27 @@ fn degenerate_hairs(calm: bool) {
     ];
     let good = hair(Vec3::new(0.2, 0.0, 0.0), 0.1, 14, 0.001);
     for model in MODELS {
-        for sag_free in [true, false] {
+        for sag_free in if calm { vec![true, false] } else { vec![true] } {
             for (name, bad) in &cases {
                 let what = format!("{model:?} {name} sag-free {sag_free}");
                 let hairs = vec![good.clone(), bad.clone()];
                 let settings = Settings { model, sag_free, ..Settings::default() };
                 let mut shot = Shot::new(&hairs, &settings, GRAVITY);
-                let frames = if bad.len() > 100 { 2 } else { 8 };
+                // Two thousand points take a second a step.
+                let (frames, seconds) = if bad.len() > 100 { (1, FRAME / 32.0) } else { (3, FRAME) };
                 for _ in 0..frames {
                     let t = shot.time;
-                    shot.go(FRAME, &move |f| shaken_10g(t + f * FRAME), &Body::default(), None);
+                    shot.go(seconds, &move |f| shaken_10g(t + f * seconds), &Body::default(), None);
                     check(&shot, &hairs, &what);
                 }
                 let mut alone = Shot::new(&hairs[..1], &settings, GRAVITY);
                 for _ in 0..frames {
                     let t = alone.time;
-                    alone.go(FRAME, &move |f| shaken_10g(t + f * FRAME), &Body::default(), None);
+                    alone.go(seconds, &move |f| shaken_10g(t + f * seconds), &Body::default(), None);
                 }
                 let apart = shot.hair(0).iter().zip(alone.hair(0)).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
                 assert!(apart == 0.0 || !calm, "{what}: it changes its neighbour by {apart}");
-                if calm && length(bad) > 1e-6 && frames == 8 {
+                if calm && length(bad) > 1e-6 && bad.len() <= 100 {
                     recovers(&mut shot, 1.0, &hairs, &what);
                 }
             }
@@ -292,12 +293,12 @@ fn materials_from_gossamer_to_rails() {
                 let what = format!("{model:?} {name} sag-free {sag_free}");
                 let settings = Settings { model, material: *material, sag_free, ..Settings::default() };
                 let mut shot = Shot::new(&hairs, &settings, GRAVITY);
-                for _ in 0..4 {
+                for _ in 0..2 {
                     let t = shot.time;
                     shot.go(FRAME, &move |f| shaken_10g(t + f * FRAME), &Body::default(), None);
                     check(&shot, &hairs, &what);
                 }
-                shot.steps(2, FRAME);
+                shot.wait(FRAME);
                 check(&shot, &hairs, &what);
             }
         }
@@ -438,7 +439,7 @@ fn soft_hair_crushed_together_spreads_again() {
             ("a tenth as long", natural.iter().map(|p| p.map(|x| 0.1 * x)).collect()),
         ] {
             let settings = Settings { model, sag_free: false, ..Settings::default() };
-            let mut shot = Shot::deformed(&[natural.clone()], &[pose], &settings, GRAVITY);
+            let mut shot = Shot::deformed(std::slice::from_ref(&natural), &[pose], &settings, GRAVITY);
             shot.roots[0].position = [0.0; 3];
             let what = format!("{model:?} {name}");
             for _ in 0..48 {

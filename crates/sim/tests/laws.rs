@@ -331,8 +331,8 @@ fn far_from_the_origin_hair_moves_as_near_it() {
                 let motion = shake(far.time, offset);
                 far.go(1.0 / 24.0, &motion, &Body::default(), None);
             }
-            for h in 0..hairs.len() {
-                let length: f64 = hairs[h].windows(2).map(|w| (Vec3::from(w[1]) - Vec3::from(w[0])).norm()).sum();
+            for (h, hair) in hairs.iter().enumerate() {
+                let length: f64 = hair.windows(2).map(|w| (Vec3::from(w[1]) - Vec3::from(w[0])).norm()).sum();
                 let apart =
                     far.hair(h).iter().zip(near.hair(h)).map(|(a, b)| (a - offset - b).norm()).fold(0.0, f64::max);
                 println!("{model:?} hair {h}: {:.1e} L", apart / length);

@@ -338,7 +338,7 @@ fn a_hanging_curl_is_as_long_as_loves_helix() {
     let (turns, each) = (10, 24);
     let n = turns * each;
     for model in MODELS.into_iter().filter(|m| *m == Model::Rod) {
-        for (slope, gamma) in [(0.2, 2e3), (0.5, 6e3)] {
+        for (slope, gamma) in [(0.2, 2e3)] {
             // Curvature k and torsion slope k: k sqrt(1 + slope^2) L = 2 pi turns.
             let omega = 2.0 * PI * turns as f64;
             let curvature = omega / f64::sqrt(1.0 + slope * slope);
@@ -356,7 +356,7 @@ fn a_hanging_curl_is_as_long_as_loves_helix() {
             let m = Material { damping: 0.03, drag_factor: 200.0, ..rod(gamma) };
             let settings = Settings { tolerance: 1e-5, ..plain(model, m) };
             let mut shot = Shot::new(&[natural], &settings, GRAVITY);
-            shot.steps(200, 0.02);
+            shot.steps(160, 0.02);
             // The clamp holds the first turns at their natural pitch: measured beyond them.
             let p = shot.hair(0);
             let start = 1.0 / turns as f64;
