@@ -338,7 +338,7 @@ fn a_hanging_curl_is_as_long_as_loves_helix() {
     let (turns, each) = (10, 24);
     let n = turns * each;
     for model in MODELS.into_iter().filter(|m| *m == Model::Rod) {
-        for (slope, gamma) in [(0.2, 2e3)] {
+        for (slope, gamma) in [(0.2, 2e3), (0.2, 1e3)] {
             // Curvature k and torsion slope k: k sqrt(1 + slope^2) L = 2 pi turns.
             let omega = 2.0 * PI * turns as f64;
             let curvature = omega / f64::sqrt(1.0 + slope * slope);
@@ -365,7 +365,7 @@ fn a_hanging_curl_is_as_long_as_loves_helix() {
             let at = |i: i32| start + length * (f64::from(i) + 0.5) / 200.0;
             let exact = (0..200).map(|i| sin_pitch(at(i))).sum::<f64>() * length / 200.0;
             println!("{model:?} slope {slope} Gamma {gamma}: {long:.4} for {exact:.4}, natural {:.4}", rise * length);
-            assert!((long / exact - 1.0).abs() < 0.03 && exact > 1.3 * rise * length);
+            assert!((long / exact - 1.0).abs() < 0.03 && exact > 1.2 * rise * length);
         }
     }
 }
