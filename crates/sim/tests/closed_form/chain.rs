@@ -139,6 +139,24 @@ impl Chain {
 /// ascending. Negative `gamma`: standing upright. `M_ij = m(max(i, j)) / n^2` with `m(i)` the mass beyond link i;
 /// stiffness from hinges and weight.
 pub fn frequencies(gamma: f64, n: usize) -> Vec<f64> {
+    let (mass, stiffness) = small_oscillations(gamma, n);
+    generalised(&stiffness, &mass).iter().map(|x| x.max(0.0).sqrt()).collect()
+}
+
+/// What to weigh the links' angles with to get the amplitude of one of those oscillations alone, in their order.
+pub fn projections(gamma: f64, n: usize) -> Vec<Vec<f64>> {
+    let (mass, stiffness) = small_oscillations(gamma, n);
+    let l = mass.cholesky().expect("positive definite").l();
+    let half = l.solve_lower_triangular(&stiffness).expect("regular");
+    let whole = l.solve_lower_triangular(&half.transpose()).expect("regular");
+    let e = SymmetricEigen::new((&whole + whole.transpose()) * 0.5);
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|a, b| e.eigenvalues[*a].total_cmp(&e.eigenvalues[*b]));
+    order.iter().map(|k| (&l * e.eigenvectors.column(*k)).iter().copied().collect()).collect()
+}
+
+/// Mass and stiffness by the links' angles.
+fn small_oscillations(gamma: f64, n: usize) -> (DMatrix<f64>, DMatrix<f64>) {
     let l = 1.0 / n as f64;
     let beyond = |i: usize| (n as f64 - i as f64 - 0.5) * l;
     let mass = DMatrix::from_fn(n, n, |i, j| l * l * beyond(i.max(j)));
@@ -150,7 +168,7 @@ pub fn frequencies(gamma: f64, n: usize) -> Vec<f64> {
             _ => 0.0,
         }
     });
-    generalised(&stiffness, &mass).iter().map(|x| x.max(0.0).sqrt()).collect()
+    (mass, stiffness)
 }
 
 /// Eigenvalues of `a x = lambda b x`, ascending; `b` positive definite.

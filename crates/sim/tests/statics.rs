@@ -1,0 +1,371 @@
+//! Strands at rest against closed forms: cantilevers, curls, chains, and where straight or round shapes buckle.
+
+mod closed_form;
+mod common;
+
+use closed_form::elastica::{self, Load};
+use closed_form::{cable, formula, helix};
+use common::{G, GRAVITY, MODELS, Shot, Vec3, bending_time, links, placed, placed_turned, plain, rod, straight};
+use pelage_sim::{End, Material, Model, Settings};
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// Settings of a rod that comes to rest soon.
+fn calm(model: Model, gamma: f64) -> Settings {
+    plain(model, Material { damping: 0.3, ..rod(gamma) })
+}
+
+/// How far a horizontal cantilever reaches, how far it drops, and how its root hinge turns.
+fn cantilever(model: Model, gamma: f64, n: usize) -> (f64, f64, f64) {
+    let mut shot = Shot::new(&[straight(n, Vec3::x())], &calm(model, gamma), GRAVITY);
+    shot.come_to_rest();
+    let p = shot.hair(0);
+    let tip = p[n];
+    assert!(tip.z.abs() < 1e-9);
+    (tip.x, -tip.y, -libm::atan2(p[1].y, p[1].x))
+}
+
+#[test]
+fn cantilevers_hang_as_the_discrete_reference() {
+    for model in MODELS {
+        for (gamma, n, bound) in
+            [(0.1, 50, 0.02), (1.0, 50, 0.02), (10.0, 50, 0.02), (100.0, 50, 0.02), (300.0, 100, 0.05)]
+        {
+            let (x, drop, hinge) = cantilever(model, gamma, n);
+            let load = Load { gamma, ..Load::default() };
+            let exact = elastica::continuous(&load, 400);
+            let same = elastica::discrete(&load, n);
+            let ratio = drop / x;
+            println!(
+                "{model:?} Gamma {gamma}, {n}: H/W {ratio:.5}, continuous {:.2e}, chain {:.2e}; tip {:.1e}",
+                ratio / exact.height_over_width() - 1.0,
+                ratio / same.height_over_width() - 1.0,
+                libm::hypot(x - exact.x, drop - exact.drop)
+            );
+            match model {
+                Model::Rod => {
+                    assert!((ratio / exact.height_over_width() - 1.0).abs() < bound);
+                    // The chain of rigid links is the same discretisation.
+                    assert!((ratio / same.height_over_width() - 1.0).abs() < 2e-3);
+                    assert!(libm::hypot(x - exact.x, drop - exact.drop) < 3e-3);
+                }
+                Model::Springs | Model::Paper => {
+                    if gamma <= 100.0 {
+                        assert!(libm::hypot(x - exact.x, drop - exact.drop) < 1e-2);
+                    }
+                }
+            }
+            // Identity: drop = theta'(0)^2 / (2 Gamma), theta'(0) by the root hinge of doubled stiffness.
+            let root = 2.0 * n as f64 * hinge;
+            let residual = root * root / (2.0 * gamma) / drop - 1.0;
+            println!("    identity {residual:.2e}");
+            if model == Model::Rod {
+                assert!(residual.abs() < 0.01);
+            }
+        }
+    }
+}
+
+#[test]
+fn cantilevers_are_of_second_order_in_space() {
+    for model in MODELS {
+        for gamma in [3.0, 30.0] {
+            let exact = elastica::continuous(&Load { gamma, ..Load::default() }, 400);
+            let errors = [25, 50, 100].map(|n| {
+                let (x, drop, _) = cantilever(model, gamma, n);
+                libm::hypot(x - exact.x, drop - exact.drop)
+            });
+            let order = [0, 1].map(|k| libm::log2(errors[k] / errors[k + 1]));
+            println!("{model:?} Gamma {gamma}: errors {errors:?}, order {order:?}");
+            assert!(order.iter().all(|o| (1.8..2.6).contains(o)));
+        }
+    }
+}
+
+#[test]
+fn clamps_of_any_direction_and_natural_curls() {
+    let n = 50;
+    for model in MODELS {
+        for (gamma, clamp, curvature) in [
+            (20.0, -0.7, 0.0),
+            (20.0, 0.9, 0.0),
+            (5.0, 0.0, 2.0),
+            (20.0, -0.5, -3.0),
+            (60.0, 0.5, 5.0),
+            (10.0, -1.2, 1.5),
+        ] {
+            let l = 1.0 / n as f64;
+            let natural: Vec<f64> = (0..n).map(|i| -(clamp + curvature * (i as f64 + 0.5) * l)).collect();
+            let mut shot = Shot::new(&[links(&natural)], &calm(model, gamma), GRAVITY);
+            shot.come_to_rest();
+            let tip = shot.tip(0);
+            let load = Load { gamma, clamp, curvature, ..Load::default() };
+            let (exact, same) = (elastica::continuous(&load, 400), elastica::discrete(&load, n));
+            let error = libm::hypot(tip.x - exact.x, tip.y + exact.drop);
+            let own = libm::hypot(tip.x - same.x, tip.y + same.drop);
+            println!("{model:?} Gamma {gamma} clamp {clamp} curvature {curvature}: {error:.1e}, chain {own:.1e}");
+            match model {
+                Model::Rod => assert!(error < 3e-3 && own < 5e-4),
+                Model::Springs | Model::Paper => assert!(error < 1e-2),
+            }
+        }
+    }
+}
+
+#[test]
+fn a_horizontal_hook_twists_as_castigliano_says() {
+    // A quarter circle in the plane across gravity: bending and twisting share the load. With t from the tip, moments
+    // w R^2 (1 - cos t) and w R^2 (t - sin t) under the weight, R sin t and R (1 - cos t) under a unit load.
+    let n = 50;
+    for model in MODELS {
+        for poisson in [0.0, 0.3, 0.5] {
+            let gamma = 0.05;
+            let step = FRAC_PI_2 / n as f64;
+            let angle: Vec<f64> = (0..n).map(|i| (i as f64 + 0.5) * step).collect();
+            let hook = links(&angle);
+            let settings = plain(model, Material { poisson, damping: 0.3, ..rod(gamma) });
+            let mut shot = Shot::new(&[hook], &settings, [0.0, 0.0, -G]);
+            shot.come_to_rest();
+            let radius: f64 = 2.0 / PI;
+            let twisting = (1.0 + poisson) * (PI * PI / 8.0 - FRAC_PI_2 + 0.5);
+            let exact = gamma * radius.powi(4) * (0.5 + twisting);
+            let error = -shot.tip(0).z / exact - 1.0;
+            println!("{model:?} Poisson {poisson}: {error:.2e}");
+            assert!(error.abs() < 0.005);
+        }
+    }
+}
+
+#[test]
+fn an_end_turned_bends_a_rod_to_an_arc() {
+    let n = 40;
+    for model in MODELS {
+        // No gravity; the tip is carried to where an end moment alone would hold it.
+        let settings = Settings { tip: End::Clamped, ..calm(model, 1.0) };
+        let mut shot = Shot::new(&[straight(n, Vec3::x())], &settings, [0.0; 3]);
+        let place = |a: f64| {
+            let [x, y] = formula::bent_by_moment(a);
+            vec![placed_turned([x, y, 0.0], Vec3::z(), a)]
+        };
+        for k in 1..=30 {
+            let a = PI * f64::from(k) / 30.0;
+            shot.carry(0.02, shot.roots.clone(), Some(place(a)));
+        }
+        shot.come_to_rest();
+        let bent = shot.hair(0);
+        let far = bent.iter().enumerate().map(|(i, p)| {
+            let s = i as f64 / n as f64;
+            let [x, y] = formula::bent_by_moment(PI * s).map(|c| c * s);
+            (p - Vec3::new(x, y, 0.0)).norm()
+        });
+        let far = far.fold(0.0, f64::max);
+        println!("{model:?}: {far:.1e} from the half circle");
+        assert!(far < 1e-3);
+    }
+}
+
+#[test]
+fn soft_hair_between_two_points_is_a_catenary() {
+    let n = 50;
+    for model in MODELS {
+        for length in [1.2, 2.0] {
+            let settings = Settings {
+                root: End::Pinned,
+                tip: End::Pinned,
+                ..plain(model, Material { bend_factor: 1e-8, drag_factor: 300.0, ..rod(1.0) })
+            };
+            // A tent, upside down; length 1, so that the ends are 1 / length apart.
+            let lean = libm::acos(1.0 / length);
+            let tent: Vec<f64> = (0..n).map(|i| if i < n / 2 { -lean } else { lean }).collect();
+            let mut shot = Shot::new(&[links(&tent)], &settings, GRAVITY);
+            shot.come_to_rest();
+            let sag = -shot.hair(0).iter().map(|p| p.y).fold(0.0, f64::min) * length;
+            let (exact, same) = (cable::catenary(length).sag, cable::discrete(length, n).sag);
+            println!("{model:?} length {length}: sag {sag:.5}, catenary {exact:.5}, chain {same:.5}");
+            assert!((sag / same - 1.0).abs() < 2e-3 && (sag / exact - 1.0).abs() < 5e-3);
+        }
+    }
+}
+
+#[test]
+fn a_soft_hair_stretches_under_its_weight() {
+    for model in MODELS {
+        let gamma = 100.0;
+        let m = rod(gamma);
+        // w L / (2 E A) = 0.005.
+        let area = std::f64::consts::FRAC_PI_4 * m.diameter * m.diameter;
+        let weight = m.density * area * G;
+        let stretch_factor = weight / (2.0 * m.young * area * 0.005);
+        let settings = plain(model, Material { stretch_factor, damping: 0.3, ..m });
+        let mut shot = Shot::new(&[straight(40, -Vec3::y())], &Settings { strain_limit: 0.1, ..settings }, GRAVITY);
+        shot.come_to_rest();
+        let longer = -shot.tip(0).y - 1.0;
+        let exact = formula::stretch_under_weight(weight, 1.0, m.young * area * stretch_factor);
+        println!("{model:?}: {longer:.6} for {exact:.6}");
+        assert!((longer / exact - 1.0).abs() < 1e-3);
+    }
+}
+
+/// Whether a small push sideways grows within `count` steps: the distance to the same hair without the push.
+fn grows(shot: &mut Shot, push: Vec3, count: usize, seconds: f64) -> bool {
+    let mut calm = shot.clone();
+    let gravity = shot.gravity;
+    shot.gravity = (Vec3::from(gravity) + push).into();
+    shot.wait(seconds);
+    shot.gravity = gravity;
+    calm.wait(seconds);
+    let (mut early, mut late) = (0.0f64, 0.0f64);
+    for k in 0..count {
+        shot.wait(seconds);
+        calm.wait(seconds);
+        let (a, b) = (shot.hair(0), calm.hair(0));
+        let away = a.iter().zip(&b).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        if k < count / 40 {
+            early = early.max(away);
+        } else {
+            late = late.max(away);
+        }
+    }
+    println!("      early {early:.1e} late {late:.1e}");
+    // Near its threshold a slow oscillation goes on to grow a little after the first moments.
+    assert!(late < 20.0 * early || late > 100.0 * early, "undecided: {early} {late}");
+    late > 100.0 * early
+}
+
+#[test]
+fn upright_hair_buckles_at_greenhills_height() {
+    for model in MODELS {
+        for (factor, falls) in [(0.95, false), (1.05, true)] {
+            let gamma = formula::self_buckling() * factor;
+            let settings = plain(model, Material { damping: 5e-3, ..rod(gamma) });
+            let mut shot = Shot::new(&[straight(50, Vec3::y())], &settings, GRAVITY);
+            assert_eq!(grows(&mut shot, Vec3::new(1e-4, 0.0, 0.7e-4), 600, 0.03), falls, "{model:?} {factor}");
+        }
+    }
+}
+
+#[test]
+fn pushed_ends_buckle_at_eulers_loads() {
+    let n = 50;
+    for model in MODELS {
+        for (root, tip, load) in [
+            (End::Pinned, End::Pinned, PI * PI),
+            (End::Clamped, End::Pinned, formula::euler_clamped_pinned()),
+            (End::Clamped, End::Clamped, formula::euler_clamped_clamped()),
+        ] {
+            for (factor, buckles) in [(0.95, false), (1.05, true)] {
+                let m = rod(1.0);
+                // The compression that carries the load: P L / (E A), with B / (E A) = d^2 / 16.
+                let softer = 1e-2;
+                let shorter = factor * load * m.diameter * m.diameter / (16.0 * softer);
+                let m = Material { damping: 1e-2, stretch_factor: softer, ..m };
+                let settings = Settings { root, tip, tolerance: 1e-9, ..plain(model, m) };
+                let mut shot = Shot::new(&[straight(n, Vec3::x())], &settings, [0.0; 3]);
+                shot.carry(0.05, vec![placed([0.0; 3])], Some(vec![placed([1.0 - shorter, 0.0, 0.0])]));
+                let push = Vec3::new(0.0, 1e-6, 0.6e-6);
+                let grew = grows(&mut shot, push, 300, 0.03 * bending_time(1.0));
+                assert_eq!(grew, buckles, "{model:?} {root:?} {tip:?} {factor}");
+            }
+        }
+    }
+}
+
+/// Turns the tip about its direction there, and asks whether a small push grows.
+fn twisted(shot: &mut Shot, tip: [f64; 3], at_rest: f64, about: Vec3, angle: f64, push: Vec3) -> bool {
+    let count = 60;
+    for k in 1..=count {
+        let q = nalgebra::UnitQuaternion::from_axis_angle(
+            &nalgebra::Unit::new_normalize(about),
+            angle * f64::from(k) / f64::from(count),
+        ) * nalgebra::UnitQuaternion::from_axis_angle(&Vec3::z_axis(), at_rest);
+        let mut root = placed(tip);
+        root.rotation = [q.i, q.j, q.k, q.w];
+        shot.carry(0.01, shot.roots.clone(), Some(vec![root]));
+    }
+    grows(shot, push, 400, 0.03 * bending_time(1.0))
+}
+
+#[test]
+fn twisted_rods_buckle_at_greenhills_moment() {
+    // Clamped at both ends, M L / B = m with tan(m / 2) = m / 2: w = y + i z obeys w'''' + i m w''' = 0.
+    let half = closed_form::root(|x| libm::sin(x) - x * libm::cos(x), 4.0, 4.7);
+    for model in MODELS {
+        for (factor, buckles) in [(0.95, false), (1.05, true)] {
+            let m = rod(1.0);
+            let angle = factor * 2.0 * half * (1.0 + m.poisson);
+            let settings = Settings {
+                tip: End::Clamped,
+                tolerance: 1e-9,
+                ..plain(model, Material { damping: 1e-4, stretch_factor: 1e-2, ..m })
+            };
+            let mut shot = Shot::new(&[straight(60, Vec3::x())], &settings, [0.0; 3]);
+            let grew = twisted(&mut shot, [1.0, 0.0, 0.0], 0.0, Vec3::x(), angle, Vec3::new(0.0, 1e-6, 0.6e-6));
+            assert_eq!(grew, buckles, "{model:?} {factor}");
+        }
+    }
+}
+
+#[test]
+fn a_twisted_ring_leaves_its_plane_where_michell_says() {
+    let n = 60;
+    for model in MODELS {
+        for (factor, buckles) in [(0.95, false), (1.05, true)] {
+            let m = rod(1.0);
+            let settings = Settings { tip: End::Clamped, ..plain(model, Material { damping: 2e-3, ..m }) };
+            // A straight rod bent to a ring: every inner hinge by 2 pi / n, the clamps' by half of that.
+            let mut shot = Shot::new(&[straight(n, Vec3::x())], &settings, [0.0; 3]);
+            let bent = |a: f64| {
+                let angle: Vec<f64> = (0..n).map(|i| a * (i as f64 + 0.5) / n as f64).collect();
+                links(&angle)[n]
+            };
+            for k in 1..=100 {
+                let a = 2.0 * PI * f64::from(k) / 100.0;
+                let tip = placed_turned(bent(a), Vec3::z(), a);
+                shot.carry(0.01, shot.roots.clone(), Some(vec![tip]));
+            }
+            shot.steps(40, 0.05);
+            let off = shot.hair(0).iter().map(|p| p.z.abs()).fold(0.0, f64::max);
+            assert!(off < 1e-6, "{off}");
+            let angle = factor * formula::ring_twist(2, 1.0 / (1.0 + m.poisson));
+            let grew = twisted(&mut shot, bent(2.0 * PI), 2.0 * PI, Vec3::x(), angle, Vec3::new(0.0, 0.0, 1e-6));
+            assert_eq!(grew, buckles, "{model:?} {factor}");
+        }
+    }
+}
+
+#[test]
+fn a_hanging_curl_is_as_long_as_loves_helix() {
+    // A helix of ten turns hangs from its clamp. Every piece bears the weight below it, along the axis.
+    let (turns, each) = (10, 24);
+    let n = turns * each;
+    for model in MODELS.into_iter().filter(|m| *m == Model::Rod) {
+        for (slope, gamma) in [(0.2, 2e3), (0.2, 1e3)] {
+            // Curvature k and torsion slope k: k sqrt(1 + slope^2) L = 2 pi turns.
+            let omega = 2.0 * PI * turns as f64;
+            let curvature = omega / f64::sqrt(1.0 + slope * slope);
+            let (radius, rise) = (curvature / (omega * omega), slope * curvature / omega);
+            let natural: Vec<[f64; 3]> = (0..=n)
+                .map(|i| {
+                    let s = i as f64 / n as f64;
+                    [radius * libm::cos(omega * s), -rise * s, radius * libm::sin(omega * s)]
+                })
+                .collect();
+            let c_over_b = 1.0 / 1.3;
+            // Forces in units of B k^2.
+            let force = |s: f64| gamma * (1.0 - s) / (curvature * curvature);
+            let sin_pitch = |s: f64| helix::helix(c_over_b, slope, force(s)).sin_pitch;
+            let m = Material { damping: 0.03, drag_factor: 200.0, ..rod(gamma) };
+            let settings = Settings { tolerance: 1e-5, ..plain(model, m) };
+            let mut shot = Shot::new(&[natural], &settings, GRAVITY);
+            shot.steps(160, 0.02);
+            // The clamp holds the first turns at their natural pitch: measured beyond them.
+            let p = shot.hair(0);
+            let start = 1.0 / turns as f64;
+            let length = 1.0 - start;
+            let long = p[each].y - p[n].y;
+            let at = |i: i32| start + length * (f64::from(i) + 0.5) / 200.0;
+            let exact = (0..200).map(|i| sin_pitch(at(i))).sum::<f64>() * length / 200.0;
+            println!("{model:?} slope {slope} Gamma {gamma}: {long:.4} for {exact:.4}, natural {:.4}", rise * length);
+            assert!((long / exact - 1.0).abs() < 0.03 && exact > 1.2 * rise * length);
+        }
+    }
+}
