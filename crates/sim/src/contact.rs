@@ -63,8 +63,9 @@ impl Keep {
     }
 }
 
-fn is_free(g: &Group, i: usize, l: usize) -> bool {
-    g.strand[l].is_some() && g.node[i].held.0[l] == 0.0
+/// Points of the axis that nobody holds.
+pub fn is_free(g: &Group, i: usize, l: usize) -> bool {
+    g.strand[l].is_some() && g.node[i].held.0[l] == 0.0 && g.node[i].share.0[l] > 0.0
 }
 
 /// Finds the contacts of some lanes at the nodes' present positions; false if there are none. `start` is where nodes were

@@ -5,8 +5,12 @@ use crate::contact::Keep;
 use crate::lanes::{LANES, Pack};
 use crate::rod::Elastic;
 use crate::simulation::{End, Settings};
+use crate::springs::kernel::{self, NodeAltitude};
+use crate::springs::layout::Layout;
+use crate::springs::plain;
 use crate::stage::{Motion, Node};
 use crate::{Rigid, Vec3};
+use pelage_geom::NONE;
 
 /// A strand before it is packed: points from root to tip, at rest.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,23 +38,32 @@ pub struct Group {
     pub level: [u8; LANES],
     /// Spans for which each strand has been at rest.
     pub quiet: [u32; LANES],
-    /// Nodes before a strand's first point: 1 if its root is clamped.
-    pub before: usize,
+    /// Node of each of a strand's points.
+    pub at: [Vec<u32>; LANES],
+    /// Springs instead of rods.
+    pub springs: Option<Springs>,
     /// How close to the body its points come; empty before the first span.
     pub keep: Keep,
-    /// First point, root direction's neighbour and frame at rest, per lane: what a clamp carries.
+    /// What the root and the tip hold, per lane.
     pub clamp: [[Clamp; 2]; LANES],
 }
 
-/// A held end at rest: the point, the ghost node beyond it, and the frame of the edge between.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// The springs of a group.
+#[derive(Clone, Debug)]
+pub struct Springs {
+    /// Constants.
+    pub model: kernel::Group,
+    /// Altitudes in use: state.
+    pub altitude: Vec<NodeAltitude>,
+}
+
+/// What a held end carries, relative to its point at rest.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Clamp {
-    /// The end point.
-    pub point: [f64; 3],
-    /// The ghost node relative to the end point.
-    pub ghost: [f64; 3],
-    /// First material direction of the edge between them.
-    pub frame: [f64; 3],
+    /// Held nodes and where they are.
+    pub node: Vec<(u32, [f64; 3])>,
+    /// Edge whose frame is held, and its first material direction.
+    pub frame: Option<(u32, [f64; 3])>,
 }
 
 /// A unit vector at right angles to the unit vector `t`, always the same.
@@ -110,6 +123,31 @@ impl Group {
         let before = usize::from(settings.root == End::Clamped);
         let after = usize::from(settings.tip == End::Clamped);
         let n = strands.iter().map(|s| s.point.len()).max().unwrap_or(2) + before + after;
+        let mut g = Group::inert(n, strands);
+        for (lane, s) in strands.iter().enumerate() {
+            g.put(lane, s, before, settings);
+        }
+        g
+    }
+
+    /// Packs up to eight strands of springs.
+    pub fn pack_springs(strands: &[Strand], layouts: &[Layout], models: &[plain::Model]) -> Self {
+        let n = layouts.iter().map(|l| l.position.len()).max().unwrap_or(2);
+        let mut g = Group::inert(n, strands);
+        for (lane, (s, layout)) in strands.iter().zip(layouts).enumerate() {
+            g.put_springs(lane, s, layout, &models[lane]);
+        }
+        let all: Vec<&plain::Model> = models.iter().collect();
+        let choices: Vec<Vec<plain::Choice>> = models.iter().map(plain::Model::choices).collect();
+        let pairs: Vec<_> = models.iter().zip(&choices).map(|(m, c)| (m, &c[..])).collect();
+        let mut altitude = kernel::pack_altitudes(&pairs);
+        altitude.resize(n, NodeAltitude::default());
+        g.springs = Some(Springs { model: kernel::pack(&all), altitude });
+        g
+    }
+
+    /// A group of `n` nodes in which nothing moves.
+    fn inert(n: usize, strands: &[Strand]) -> Self {
         let mut g = Group {
             strand: [None; LANES],
             count: [0; LANES],
@@ -118,17 +156,47 @@ impl Group {
             motion: vec![Motion::default(); n],
             level: [0; LANES],
             quiet: [0; LANES],
-            before,
+            at: Default::default(),
+            springs: None,
             keep: Keep::default(),
-            clamp: [[Clamp::default(); 2]; LANES],
+            clamp: Default::default(),
         };
         for lane in 0..LANES {
             g.pad(lane, strands.get(lane).map_or(Vec3::zeros(), |s| s.point[s.point.len() - 1]));
         }
-        for (lane, s) in strands.iter().enumerate() {
-            g.put(lane, s, settings);
-        }
         g
+    }
+
+    fn put_springs(&mut self, lane: usize, s: &Strand, layout: &Layout, model: &plain::Model) {
+        let (n, k) = (layout.position.len(), s.point.len());
+        (self.strand[lane], self.count[lane]) = (Some(s.index), n);
+        self.at[lane] = vec![0; k];
+        let half = |a: usize, b: usize| 0.5 * (s.point[b] - s.point[a]).norm();
+        for i in 0..n {
+            let (node, motion) = (&mut self.node[i], &mut self.motion[i]);
+            node.mass.0[lane] = model.mass[i];
+            node.held.0[lane] = if layout.held[i] { HELD } else { 0.0 };
+            if layout.point[i] != NONE {
+                let p = layout.point[i] as usize;
+                self.at[lane][p] = i as u32;
+                let share = if p > 0 { half(p - 1, p) } else { 0.0 } + if p + 1 < k { half(p, p + 1) } else { 0.0 };
+                node.share.0[lane] = share;
+            }
+            if i + 1 < n {
+                let spring = &model.spring[i + 1][0];
+                node.length.0[lane] = (layout.position[i + 1] - layout.position[i]).norm();
+                // Not a stiffness: it marks edges whose strain counts.
+                self.elastic[i].stretch.0[lane] = f64::from(u8::from(spring.stiffness > 0.0));
+            }
+            for c in 0..3 {
+                motion.x[c].0[lane] = layout.position[i][c];
+            }
+            if layout.held[i] {
+                let tip = 2 * i > n;
+                let from = s.point[if tip { k - 1 } else { 0 }];
+                self.clamp[lane][usize::from(tip)].node.push((i as u32, (layout.position[i] - from).into()));
+            }
+        }
     }
 
     /// Inert nodes in a whole lane, one metre apart.
@@ -146,9 +214,9 @@ impl Group {
         }
     }
 
-    fn put(&mut self, lane: usize, s: &Strand, settings: &Settings) {
+    fn put(&mut self, lane: usize, s: &Strand, before: usize, settings: &Settings) {
         let section = Section::new(settings);
-        let (before, k) = (self.before, s.point.len());
+        let k = s.point.len();
         let ends = [s.point[0] - (s.point[1] - s.point[0]), s.point[k - 1] + (s.point[k - 1] - s.point[k - 2])];
         let mut point = s.point.clone();
         if before == 1 {
@@ -199,25 +267,19 @@ impl Group {
                 elastic.twist.0[lane] = section.twist / reach;
             }
         }
-        let end = |at: usize, ghost: Vec3, edge: usize| Clamp {
-            point: s.point[at].into(),
-            ghost: (ghost - s.point[at]).into(),
-            frame: std::array::from_fn(|c| self.motion[edge].m[c].0[lane]),
-        };
-        self.clamp[lane] = [end(0, ends[0], 0), end(k - 1, ends[1], n.saturating_sub(2))];
-    }
-
-    /// Positions of a lane's own points.
-    pub fn points(&self, lane: usize) -> impl Iterator<Item = Vec3> + '_ {
-        let after = self.count[lane] - self.before - self.own(lane);
-        let last = self.count[lane] - after;
-        (self.before..last).map(move |i| self.x(i, lane))
-    }
-
-    /// Number of a lane's own points.
-    pub fn own(&self, lane: usize) -> usize {
-        let ghosts = (0..self.count[lane]).filter(|&i| self.node[i].share.0[lane] == 0.0).count();
-        self.count[lane] - ghosts
+        self.at[lane] = own.clone().map(|i| i as u32).collect();
+        for (tip, end) in [settings.root, settings.tip].into_iter().enumerate() {
+            let (point, ghost, edge) = if tip == 0 { (before, 0, 0) } else { (before + k - 1, n - 1, n.max(2) - 2) };
+            let from = point_of(&self.motion[point], lane);
+            let clamp = &mut self.clamp[lane][tip];
+            if end != End::Free {
+                clamp.node.push((point as u32, [0.0; 3]));
+            }
+            if end == End::Clamped {
+                clamp.node.push((ghost as u32, (point_of(&self.motion[ghost], lane) - from).into()));
+                clamp.frame = Some((edge as u32, std::array::from_fn(|c| self.motion[edge].m[c].0[lane])));
+            }
+        }
     }
 
     /// A node's position.
@@ -258,7 +320,16 @@ impl Group {
     }
 
     /// Copies a lane's state from another snapshot of the same group.
-    pub fn revert(&mut self, lane: usize, saved: &[Motion]) {
+    pub fn revert(&mut self, lane: usize, saved: &[Motion], altitudes: &[NodeAltitude]) {
+        if let Some(springs) = &mut self.springs {
+            for (to, from) in springs.altitude.iter_mut().zip(altitudes) {
+                for c in 0..3 {
+                    to.face[c].0[lane] = from.face[c].0[lane];
+                }
+                to.inverse_height.0[lane] = from.inverse_height.0[lane];
+                to.offset.0[lane] = from.offset.0[lane];
+            }
+        }
         for (to, from) in self.motion.iter_mut().zip(saved) {
             for c in 0..3 {
                 to.x[c].0[lane] = from.x[c].0[lane];
@@ -268,6 +339,10 @@ impl Group {
             }
         }
     }
+}
+
+fn point_of(m: &Motion, lane: usize) -> Vec3 {
+    Vec3::new(m.x[0].0[lane], m.x[1].0[lane], m.x[2].0[lane])
 }
 
 /// A mask of lanes as numbers: 1 or 0.

@@ -7,12 +7,14 @@
 //! A strand whose stage does not converge, or that turns too far in a step, takes that step in two halves, and so on; it
 //! alone, so no hair changes another.
 
-use crate::band::HELD;
+use crate::band::{self, HELD, Panel, RING, Window};
 use crate::contact;
 use crate::group::{Group, mask};
 use crate::lanes::{self, Kernel, L3, LANES, Lanes, Pack, Width, load3, mul_add3, scale3, store3, sub3};
 use crate::rod::{self, Damping, Scratch, Watch};
-use crate::stage::{Air, Contact, Motion, Stage};
+use crate::springs::kernel::{self, NodeAltitude};
+use crate::springs::paper::{FORGET, limit_strain as limit_springs};
+use crate::stage::{Air, Contact, Motion, Stage, open_node};
 
 /// The fraction of a step that each stage spans: 1 - 1 / sqrt 2.
 const GAMMA: f64 = 0.292_893_218_813_452_5;
@@ -37,10 +39,17 @@ const FIRST_TURN: f64 = 0.05;
 /// Slowest convergence that is believed.
 const SLOWEST: f64 = 0.9;
 
+/// A group's state before a step.
+#[derive(Clone, Debug, Default)]
+struct Snapshot {
+    motion: Vec<Motion>,
+    altitude: Vec<NodeAltitude>,
+}
+
 /// Buffers of a thread.
 #[derive(Debug, Default)]
 pub struct Work {
-    saved: Vec<Vec<Motion>>,
+    saved: Vec<Snapshot>,
     y: Vec<[Pack; 3]>,
     base: Vec<[Pack; 3]>,
     /// Velocity that a stage starts from.
@@ -49,6 +58,8 @@ pub struct Work {
     contact: Vec<Contact>,
     air: Vec<Air>,
     twisting: Scratch<4, 11>,
+    springs: Scratch<3, 12>,
+    x: Vec<[Pack; 3]>,
     straight: Scratch<3, 9>,
 }
 
@@ -156,15 +167,15 @@ pub fn advance<A: Around>(
     let now: [bool; LANES] = std::array::from_fn(|l| wanted[l] && !deeper[l]);
     if now.contains(&true) {
         let saved = save(g, work, depth);
-        let converged = step(g, around, method, at, now, &saved, work, done);
-        let seen = look(g, method, &saved);
+        let converged = step(g, around, method, at, now, &saved.motion, work, done);
+        let seen = look(g, method, &saved.motion);
         for l in 0..LANES {
             let finite = seen.finite.0[l] == 0.0;
             let calm = converged[l] && finite && seen.turn.0[l] <= method.largest_turn * method.largest_turn;
             if now[l] && (calm || (depth == DEEPEST && finite)) {
                 done.deepest[l] = done.deepest[l].max(depth);
                 done.strain[l] = seen.strain.0[l];
-                if seen.strain.0[l] > method.strain_limit {
+                if seen.strain.0[l] > method.strain_limit && g.springs.is_none() {
                     limit_strain(g, l, method.strain_limit, at.length * at.span);
                     done.strain[l] = method.strain_limit;
                     done.limited += 1;
@@ -176,7 +187,7 @@ pub fn advance<A: Around>(
                 }
                 continue;
             }
-            g.revert(l, &saved);
+            g.revert(l, &saved.motion, &saved.altitude);
             if now[l] {
                 if depth == DEEPEST {
                     done.failed[l] = true;
@@ -187,6 +198,10 @@ pub fn advance<A: Around>(
             }
         }
         work.saved[depth as usize] = saved;
+        if g.springs.is_some() && (0..LANES).any(|l| now[l] && seen.strain.0[l] > method.strain_limit) {
+            let dt = at.length * at.span;
+            lanes::run(method.width, LimitSprings { g, x: &mut work.x, limit: method.strain_limit, dt });
+        }
     }
     if deeper.contains(&true) {
         let half = 0.5 * at.length;
@@ -219,13 +234,15 @@ fn limit_strain(g: &mut Group, l: usize, limit: f64, dt: f64) {
 }
 
 /// A copy of the group's state, in the buffer for its depth.
-fn save(g: &Group, work: &mut Work, depth: u8) -> Vec<Motion> {
+fn save(g: &Group, work: &mut Work, depth: u8) -> Snapshot {
     if work.saved.len() <= depth as usize {
-        work.saved.resize(depth as usize + 1, Vec::new());
+        work.saved.resize(depth as usize + 1, Snapshot::default());
     }
     let mut saved = std::mem::take(&mut work.saved[depth as usize]);
-    saved.clear();
-    saved.extend_from_slice(&g.motion);
+    saved.motion.clone_from(&g.motion);
+    if let Some(springs) = &g.springs {
+        saved.altitude.clone_from(&springs.altitude);
+    }
     saved
 }
 
@@ -249,11 +266,16 @@ fn step<A: Around>(
     work.turned.resize(n, Pack::default());
     work.contact.resize(n, Contact::default());
     work.air.resize(n, Air::default());
-    work.twisting.reserve(n);
-    work.straight.reserve(n);
+    if g.springs.is_some() {
+        work.springs.reserve(n);
+        let forget = (FORGET * dt).min(1.0);
+        lanes::run(method.width, Choose { g, x: &mut work.x, forget });
+    } else {
+        work.twisting.reserve(n);
+        work.straight.reserve(n);
+    }
     let h = GAMMA * dt;
     let (mut converged, mut touched) = (lanes, false);
-    let start = held_positions(g);
     let blowing = around.air(g, lanes, at.start, &mut work.air);
     work.turned.fill(Pack::default());
     for (second, fraction) in [(false, at.start + GAMMA * at.length), (true, at.start + at.length)] {
@@ -269,7 +291,7 @@ fn step<A: Around>(
         lanes::run(method.width, Predict { motion: &mut g.motion, y, base, from, h, rest, gravity, second });
         around.hold(g, lanes, fraction);
         let elapsed = (fraction - at.start) * at.span;
-        prescribe(g, work, &start, h, elapsed);
+        prescribe(g, work, before, h, elapsed);
         let time = StageTime { fraction, h, elapsed };
         let touching = around.solid() && around.touch(g, before, lanes, time, &mut work.contact);
         let acting = Acting { h, touching, blowing };
@@ -289,24 +311,17 @@ fn step<A: Around>(
     converged
 }
 
-/// Positions of held nodes, for their velocities.
-fn held_positions(g: &Group) -> Vec<[Pack; 3]> {
-    let last = g.node.len() - 1;
-    let ends = [0, 1.min(last), last.saturating_sub(1), last];
-    ends.iter().map(|&i| g.motion[i].x).collect()
-}
-
 /// Gives held nodes their prescribed velocity, and no inertia.
-fn prescribe(g: &Group, work: &mut Work, start: &[[Pack; 3]], h: f64, elapsed: f64) {
-    let last = g.node.len() - 1;
-    let ends = [0, 1.min(last), last.saturating_sub(1), last];
-    for i in 0..=last {
+fn prescribe(g: &Group, work: &mut Work, before: &[Motion], h: f64, elapsed: f64) {
+    for i in 0..g.node.len() {
+        if g.node[i].held.0 == [0.0; LANES] {
+            continue;
+        }
         for l in 0..LANES {
             if g.node[i].held.0[l] == HELD {
-                let from = ends.iter().position(|&e| e == i).map(|k| start[k]);
                 for c in 0..3 {
                     let x = g.motion[i].x[c].0[l];
-                    let v = from.map_or(0.0, |f| (x - f[c].0[l]) / elapsed);
+                    let v = (x - before[i].x[c].0[l]) / elapsed;
                     work.y[i][c].0[l] = x;
                     work.base[i][c].0[l] = x - h * v;
                     work.from[i][c].0[l] = v;
@@ -347,7 +362,10 @@ fn solve(
             air: blowing.then_some(&work.air),
             active: mask(active),
         };
-        let largest = if method.twist {
+        let largest = if g.springs.is_some() {
+            let (scratch, x) = (&mut work.springs, &mut work.x);
+            lanes::run(method.width, IterateSprings { g, turned: &mut work.turned, stage, scratch, x })
+        } else if method.twist {
             let scratch = &mut work.twisting;
             lanes::run(method.width, Iterate { g, turned: &mut work.turned, damping: method.damping, stage, scratch })
         } else {
@@ -391,6 +409,103 @@ impl<const D: usize, const ROWS: usize> Kernel for Iterate<'_, '_, D, ROWS> {
         let mut out = Pack::default();
         largest.store(&mut out);
         out
+    }
+}
+
+/// One iteration of springs.
+struct IterateSprings<'a, 'b> {
+    g: &'a mut Group,
+    turned: &'a mut [Pack],
+    stage: Stage<'b>,
+    scratch: &'a mut Scratch<3, 12>,
+    x: &'a mut Vec<[Pack; 3]>,
+}
+
+impl Kernel for IterateSprings<'_, '_> {
+    type Out = Pack;
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Pack {
+        let IterateSprings { g, turned, mut stage, scratch, x } = self;
+        let n = g.node.len();
+        let springs = g.springs.as_ref().expect("a group of springs");
+        positions(&g.motion, x);
+        let rhs = &mut scratch.rhs[..n + 4];
+        for r in &mut rhs[n..] {
+            *r = [Pack::default(); 3];
+        }
+        let mut window: Window<L, 3, 12> = [Panel::zero(); RING];
+        for i in 0..n + 3 {
+            if i < n {
+                open_node(i, &g.node[i], &g.motion[i], &mut stage, &mut window, &mut rhs[i]);
+                kernel::add_node::<L, true>(i, &springs.model.model[i], &springs.altitude[i], x, &mut window, rhs);
+            }
+            if i >= 3 {
+                band::eliminate::<L, 3, 12>(i - 3, &mut window, &mut scratch.factor[i - 3], rhs);
+            }
+        }
+        for j in (0..n).rev() {
+            band::substitute::<L, 3, 12>(j, &scratch.factor[j], rhs);
+        }
+        let largest = rod::apply::<L, 3, 12>(&g.node, &mut g.motion, turned, &stage.active, scratch);
+        let mut out = Pack::default();
+        largest.store(&mut out);
+        out
+    }
+}
+
+fn positions(motion: &[Motion], x: &mut Vec<[Pack; 3]>) {
+    x.clear();
+    x.extend(motion.iter().map(|m| m.x));
+}
+
+/// Chooses the altitudes of a step.
+struct Choose<'a> {
+    g: &'a mut Group,
+    x: &'a mut Vec<[Pack; 3]>,
+    forget: f64,
+}
+
+impl Kernel for Choose<'_> {
+    type Out = ();
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Choose { g, x, forget } = self;
+        positions(&g.motion, x);
+        let springs = g.springs.as_mut().expect("a group of springs");
+        for i in 3..x.len() {
+            let (candidates, altitude) = (&springs.model.candidates[i], &mut springs.altitude[i]);
+            kernel::choose_node::<L>(i, candidates, altitude, x, L::splat(forget));
+        }
+        for (m, x) in g.motion.iter_mut().zip(x.iter()) {
+            m.x = *x;
+        }
+    }
+}
+
+/// Strain limiting of springs, which act on more than the axis.
+struct LimitSprings<'a> {
+    g: &'a mut Group,
+    x: &'a mut Vec<[Pack; 3]>,
+    limit: f64,
+    dt: f64,
+}
+
+impl Kernel for LimitSprings<'_> {
+    type Out = ();
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let LimitSprings { g, x, limit, dt } = self;
+        positions(&g.motion, x);
+        let springs = g.springs.as_ref().expect("a group of springs");
+        limit_springs::<L>(&springs.model, x, limit);
+        for (m, x) in g.motion.iter_mut().zip(x.iter()) {
+            for c in 0..3 {
+                for l in 0..LANES {
+                    m.v[c].0[l] += (x[c].0[l] - m.x[c].0[l]) / dt;
+                }
+            }
+            m.x = *x;
+        }
     }
 }
 

@@ -9,6 +9,7 @@ pub mod drag;
 pub mod group;
 pub mod integrate;
 pub mod lanes;
+pub mod nine_steps;
 pub mod rod;
 pub mod settle;
 pub mod simulation;

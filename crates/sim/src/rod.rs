@@ -441,24 +441,11 @@ pub fn sweep<L: Lanes, const D: usize, const ROWS: usize>(
     let spin_scale = L::splat(1.0 / (stage.h * stage.h));
     let mut before: Option<Edge<L>> = None;
     let mut here = edge::<L>(load3(&motion[0].x), load3(&motion[1].x));
-    open_turn::<L, D, ROWS>(0, nodes, elastic, turned, here.t, motion, stage, &mut window, rhs, spin_scale);
+    open_turn::<L, D, ROWS>(0, nodes, elastic, turned, motion, stage, &mut window, rhs, spin_scale);
     for i in 0..n {
         if i + 1 < n {
             let next = if i + 2 < n { edge::<L>(load3(&motion[i + 1].x), load3(&motion[i + 2].x)) } else { here };
-            let middle = add3(here.t, next.t);
-            let tangent = scale3(middle, L::splat(1.0) / dot(middle, middle).max(L::splat(1e-30)).sqrt());
-            open_turn::<L, D, ROWS>(
-                i + 1,
-                nodes,
-                elastic,
-                turned,
-                tangent,
-                motion,
-                stage,
-                &mut window,
-                rhs,
-                spin_scale,
-            );
+            open_turn::<L, D, ROWS>(i + 1, nodes, elastic, turned, motion, stage, &mut window, rhs, spin_scale);
             add_edge(i, &here, L::load(&nodes[i].length), L::load(&elastic[i].stretch), &mut window, rhs);
             if let Some(e0) = &before {
                 let e = &elastic[i];
@@ -522,14 +509,13 @@ fn open_turn<L: Lanes, const D: usize, const ROWS: usize>(
     nodes: &[Node],
     elastic: &[Elastic],
     turned: &[Pack],
-    tangent: L3<L>,
     motion: &[Motion],
     stage: &mut Stage<'_>,
     window: &mut Window<L, D, ROWS>,
     rhs: &mut [[Pack; D]],
     spin_scale: L,
 ) {
-    open_node(j, &nodes[j], &motion[j], tangent, stage, window, &mut rhs[j]);
+    open_node(j, &nodes[j], &motion[j], stage, window, &mut rhs[j]);
     if D == 4 {
         let spin = L::load(&elastic[j].spin) * spin_scale;
         window[j % RING].0[3][3] = spin + L::load(&nodes[j].held_turn);

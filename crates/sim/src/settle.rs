@@ -10,7 +10,11 @@ use crate::band::{self, Column, Panel, RING, Window};
 use crate::group::{Group, Section, Strand};
 use crate::lanes::{self, Kernel, LANES, Lanes, Pack, Width};
 use crate::rod::{self, Damping, Scratch};
-use crate::simulation::{End, Settings};
+use crate::simulation::{End, Model, Settings};
+use crate::springs::calibrate::{self, Calibration};
+use crate::springs::layout::{self, Layout};
+use crate::springs::plain::Model as Springs;
+use crate::springs::sag;
 use crate::stage::Stage;
 
 /// Stiffness doubles at most this often: 64 times.
@@ -35,7 +39,6 @@ pub struct Figures {
 
 /// Packs a group, finds its natural shape, and lets it stand.
 pub fn prepare(strands: &[Strand], settings: &Settings, gravity: [f64; 3]) -> (Group, Figures) {
-    let mut group = Group::pack(strands, settings);
     let section = Section::new(settings);
     let g = Vec3::from(gravity).norm();
     let mut figures = Figures::default();
@@ -46,10 +49,14 @@ pub fn prepare(strands: &[Strand], settings: &Settings, gravity: [f64; 3]) -> (G
             figures.hinge = figures.hinge.max(angle(w[1] - w[0], w[2] - w[1]));
         }
     }
-    let width = if settings.wide { Width::best() } else { Width::Plain };
-    let (weight, free) = weights(&group, gravity);
     // Only a strand that is clamped at one end and free at the other is determinate.
     let sag_free = settings.sag_free && settings.root == End::Clamped && settings.tip == End::Free;
+    if settings.model != Model::Rod {
+        return (prepare_springs(strands, settings, gravity, sag_free, &mut figures), figures);
+    }
+    let mut group = Group::pack(strands, settings);
+    let width = if settings.wide { Width::best() } else { Width::Plain };
+    let (weight, free) = weights(&group, gravity);
     let settle = |group: &mut Group| {
         lanes::run(width, Settle { group, weight: &weight, free: &free, sag_free });
     };
@@ -79,6 +86,48 @@ pub fn prepare(strands: &[Strand], settings: &Settings, gravity: [f64; 3]) -> (G
         }
     }
     (group, figures)
+}
+
+/// Particles of a strand of springs; `None` where a segment is far shorter than the others.
+pub fn layout(points: &[Vec3], settings: &Settings) -> Option<Layout> {
+    let end = |e: End| match e {
+        End::Free => layout::End::Free,
+        End::Pinned => layout::End::Pinned,
+        End::Clamped => layout::End::Clamped,
+    };
+    let ends = [end(settings.root), end(settings.tip)];
+    match settings.model {
+        Model::Paper => layout::only_straight(points, ends),
+        _ => layout::zigzag(points, ends, calibration(settings).height),
+    }
+}
+
+fn calibration(settings: &Settings) -> Calibration {
+    let section = calibrate::Section::round(&settings.material);
+    calibrate::calibrate(section.twisting / section.bending)
+}
+
+/// Springs in equilibrium under gravity, as far as their loads allow.
+fn prepare_springs(
+    strands: &[Strand],
+    settings: &Settings,
+    gravity: [f64; 3],
+    sag_free: bool,
+    figures: &mut Figures,
+) -> Group {
+    let section = calibrate::Section::round(&settings.material);
+    let calibration = calibration(settings);
+    let layouts: Vec<Layout> = strands.iter().map(|s| layout(&s.point, settings).expect("checked before")).collect();
+    let mut models: Vec<Springs> = layouts.iter().map(|l| Springs::new(l, &section, &calibration)).collect();
+    if sag_free {
+        for ((s, model), layout) in strands.iter().zip(&mut models).zip(&layouts) {
+            let sagged = sag::without_sag(model, &layout.position, Vec3::from(gravity));
+            if let Some(sagged) = sagged.filter(|s| s.factor > 1.0) {
+                figures.stiffened.push((s.index, sagged.factor));
+            }
+        }
+    }
+    Group::pack_springs(strands, &layouts, &models)
 }
 
 /// Angle between two vectors, radians.

@@ -5,6 +5,7 @@ use crate::drag;
 use crate::group::{Group, Strand};
 use crate::integrate::{self, Around, Done, Interval, Method, StageTime, Work};
 use crate::lanes::{LANES, Pack, Width};
+use crate::nine_steps;
 use crate::rod::{self, Damping};
 use crate::settle;
 use crate::stage::{self, Air, Contact};
@@ -356,7 +357,9 @@ impl Simulation {
                 }
                 pick.push(own.len() as u32 - 1);
             }
-            if own.len() < 2 {
+            // Springs need segments of like length.
+            let springs = settings.model != Model::Rod && own.len() >= 2;
+            if own.len() < 2 || (springs && settle::layout(&own, settings).is_none()) {
                 rider.push(Rider { index: h, point: points });
             } else {
                 strands.push(Strand { index: h, point: own });
@@ -377,7 +380,7 @@ impl Simulation {
         let nodes: usize = group.iter().map(|g| g.node.len()).sum();
         let started = Started {
             particles: pick.len() as u64,
-            bytes: (nodes * (size_of::<crate::stage::Node>() + size_of::<crate::stage::Motion>())) as u64
+            bytes: (nodes * (size_of::<stage::Node>() + size_of::<stage::Motion>())) as u64
                 + (nodes * size_of::<rod::Elastic>()) as u64,
             stiffened: figures
                 .iter()
@@ -395,7 +398,7 @@ impl Simulation {
 
     /// Estimates the memory that [`Simulation::new`] will need, bytes, before any of it is taken.
     pub fn memory(hairs: usize, points: usize) -> u64 {
-        let node = size_of::<crate::stage::Node>() + size_of::<crate::stage::Motion>() + size_of::<rod::Elastic>();
+        let node = size_of::<stage::Node>() + size_of::<stage::Motion>() + size_of::<rod::Elastic>();
         // Ghost nodes, input and output points.
         (hairs.div_ceil(LANES) * (points + 1) * node + hairs * points * 28) as u64
     }
@@ -493,7 +496,7 @@ impl Simulation {
             if let Some((g, l)) = place {
                 let g = &self.group[*g as usize];
                 for i in self.offsets.range(s) {
-                    out[i] = g.x(g.before + self.pick[i] as usize, *l as usize).into();
+                    out[i] = g.x(g.at[*l as usize][self.pick[i] as usize] as usize, *l as usize).into();
                 }
             }
         }
@@ -512,7 +515,7 @@ impl Simulation {
             if let Some((g, l)) = place {
                 let g = &self.group[*g as usize];
                 for i in self.offsets.range(s) {
-                    out[i] = g.v(g.before + self.pick[i] as usize, *l as usize).into();
+                    out[i] = g.v(g.at[*l as usize][self.pick[i] as usize] as usize, *l as usize).into();
                 }
             }
         }
@@ -534,16 +537,27 @@ impl Simulation {
                     // Not a number before the first span.
                     let keep = |p: &[Pack]| p.get(i).map_or(f64::NAN, |p| p.0[l]);
                     out.extend([keep(&g.keep.most), keep(&g.keep.inside)]);
+                    if let Some(springs) = &g.springs {
+                        let a = &springs.altitude[i];
+                        out.extend(a.face.iter().chain([&a.inverse_height, &a.offset]).map(|p| p.0[l]));
+                    }
                 }
             }
         }
         bytemuck::cast_slice(&out).to_vec()
     }
 
+    /// Numbers that are saved of a node.
+    fn node_values(&self) -> usize {
+        if self.settings.model == Model::Rod { 14 } else { 19 }
+    }
+
     /// Takes over a saved state.
     pub fn restore(&mut self, state: &[u8]) -> Result<(), SimError> {
         let values: Vec<f64> = state.chunks_exact(8).map(bytemuck::pod_read_unaligned).collect();
-        let size = |p: &Option<(u32, u8)>| 7 + p.map_or(0, |(g, l)| 2 + 14 * self.group[g as usize].count[l as usize]);
+        let size = |p: &Option<(u32, u8)>| {
+            7 + p.map_or(0, |(g, l)| 2 + self.node_values() * self.group[g as usize].count[l as usize])
+        };
         if state.len() != 8 * self.place.iter().map(size).sum::<usize>() {
             return Err(SimError::State("its length differs"));
         }
@@ -572,6 +586,12 @@ impl Simulation {
                             keep[i].0[l] = value;
                         }
                     }
+                    if let Some(springs) = &mut g.springs {
+                        let a = &mut springs.altitude[i];
+                        for p in a.face.iter_mut().chain([&mut a.inverse_height, &mut a.offset]) {
+                            p.0[l] = next();
+                        }
+                    }
                 }
             }
         }
@@ -597,7 +617,7 @@ fn sample(points: Vec<Vec3>, segments: Option<usize>) -> Vec<Vec3> {
 
 /// Moves a group through a span.
 fn move_group(g: &mut Group, scene: &Scene<'_>, method: &Method, steps: u32, work: &mut Work, done: &mut Moved) {
-    let saved = g.motion.clone();
+    let saved = (g.motion.clone(), g.springs.as_ref().map_or(Vec::new(), |s| s.altitude.clone()));
     work.forget();
     if g.keep.most.is_empty() {
         g.keep = Keep::new(g, &scene.span.body.at(0.0), scene.settings.offset);
@@ -617,7 +637,21 @@ fn move_group(g: &mut Group, scene: &Scene<'_>, method: &Method, steps: u32, wor
             lanes[l] = true;
         }
     }
-    for k in 0..steps {
+    if scene.settings.model == Model::Paper {
+        let seconds = scene.span.seconds;
+        let body = |f: f64| scene.solid().then(|| scene.span.body.at(f));
+        let typical = (seconds / nine_steps::STEP - 1e-6).ceil().max(1.0) as u32;
+        let span = nine_steps::Span {
+            seconds,
+            steps: scene.settings.substeps.unwrap_or(typical).max(1),
+            width: method.width,
+            strain_limit: method.strain_limit,
+            friction: method.friction,
+            body: &body,
+        };
+        nine_steps::advance(g, scene, &span, lanes, &mut done.done);
+    }
+    for k in 0..if scene.settings.model == Model::Paper { 0 } else { steps } {
         let length = 1.0 / f64::from(steps);
         let at = Interval { start: f64::from(k) * length, length, span: scene.span.seconds };
         integrate::advance(g, scene, method, at, lanes, 0, work, &mut done.done);
@@ -626,7 +660,7 @@ fn move_group(g: &mut Group, scene: &Scene<'_>, method: &Method, steps: u32, wor
         let Some(s) = g.strand[l] else { continue };
         if done.done.failed[l] {
             // Held: it rides with its root for this span, and starts again from rest.
-            g.revert(l, &saved);
+            g.revert(l, &saved.0, &saved.1);
             g.carry(l, &scene.root(s, 0.0), &scene.root(s, 1.0));
             g.stop(l);
             Keep::carried(g, l, &scene.span.body.at(1.0));
@@ -719,18 +753,18 @@ fn hold_end(g: &mut Group, lane: usize, tip: bool, end: End, at: &Rigid) {
     if end == End::Free {
         return;
     }
-    let clamp = g.clamp[lane][usize::from(tip)];
-    let point = if tip { g.count[lane] - 1 - usize::from(end == End::Clamped) } else { g.before };
+    let Group { clamp, motion, .. } = g;
+    let clamp = &clamp[lane][usize::from(tip)];
     let set = |to: &mut [Pack; 3], v: Vec3| {
         for c in 0..3 {
             to[c].0[lane] = v[c];
         }
     };
-    set(&mut g.motion[point].x, Vec3::from(at.translation));
-    if end == End::Clamped {
-        let (ghost, edge) = if tip { (point + 1, point) } else { (0, 0) };
-        set(&mut g.motion[ghost].x, at.apply(Vec3::from(clamp.ghost)));
-        set(&mut g.motion[edge].m, at.quaternion() * Vec3::from(clamp.frame));
+    for (node, from) in &clamp.node {
+        set(&mut motion[*node as usize].x, at.apply(Vec3::from(*from)));
+    }
+    if let Some((edge, frame)) = clamp.frame {
+        set(&mut motion[edge as usize].m, at.quaternion() * Vec3::from(frame));
     }
 }
 
@@ -776,34 +810,37 @@ impl Around for Scene<'_> {
         let mut point: Vec<Vec3> = Vec::new();
         let mut blowing = vec![Vec3::zeros(); g.node.len()];
         for l in (0..LANES).filter(|&l| lanes[l] && g.strand[l].is_some()) {
-            let n = g.count[l];
+            let at = &g.at[l];
+            let n = at.len();
+            point.clear();
+            point.extend(at.iter().map(|&i| g.x(i as usize, l)));
             if let Some(wind) = &wind {
-                point.clear();
-                point.extend((0..n).map(|i| g.x(i, l)));
                 wind.free_along(&point, WIND_STRIDE, time, &mut blowing[..n]);
                 if wind.boundary > 0.0 && self.solid() {
                     let body = self.span.body.at(fraction);
-                    for (i, p) in point.iter().enumerate() {
+                    for (k, p) in point.iter().enumerate() {
                         if body.distance_bound(*p) < wind.boundary {
                             let hit = body.sample(*p);
                             let surface =
                                 Surface { distance: hit.distance, normal: hit.normal, velocity: hit.velocity };
-                            blowing[i] = crate::wind::beside(blowing[i], &surface, wind.boundary);
+                            blowing[k] = crate::wind::beside(blowing[k], &surface, wind.boundary);
                         }
                     }
                 }
             }
-            let length: f64 = (0..n).map(|i| g.node[i].share.0[l]).sum();
-            for i in 0..n {
+            let length: f64 = at.iter().map(|&i| g.node[i as usize].share.0[l]).sum();
+            for (k, &i) in at.iter().enumerate() {
+                let i = i as usize;
                 let share = g.node[i].share.0[l];
-                let e = g.x((i + 1).min(n - 1), l) - g.x(i.saturating_sub(1), l);
+                let e = point[(k + 1).min(n - 1)] - point[k.saturating_sub(1)];
                 let t = e.try_normalize(SHORTEST).unwrap_or(Vec3::zeros());
-                let u = g.v(i, l) - blowing[i];
+                let u = g.v(i, l) - blowing[k];
                 let along = t.dot(&u);
                 let across = (u - t * along).norm();
                 let d = drag::drag(&still, self.settings.material.diameter, length, across, along.abs());
                 for c in 0..3 {
-                    air[i].velocity[c].0[l] = blowing[i][c];
+                    air[i].velocity[c].0[l] = blowing[k][c];
+                    air[i].tangent[c].0[l] = t[c];
                 }
                 air[i].across.0[l] = d.across * share * factor;
                 air[i].along.0[l] = d.along * share * factor;

@@ -5,7 +5,7 @@
 //! iteration assembles a positive definite matrix and gradient per node, solves the band directly, and moves.
 
 use crate::band::{HELD, Window};
-use crate::lanes::{L3, Lanes, Pack, dot, load3, scale3, sub3};
+use crate::lanes::{Lanes, Pack, dot, load3, scale3, sub3};
 
 /// Longest turn of a segment in one iteration, radians. Above about 1 an iteration may jump to a wrong fold; below 0.1
 /// large steps need many iterations.
@@ -65,6 +65,8 @@ pub struct Contact {
 pub struct Air {
     /// Its velocity, metres per second.
     pub velocity: [Pack; 3],
+    /// Direction of the hair.
+    pub tangent: [Pack; 3],
     /// Drag across the hair, newton second per metre.
     pub across: Pack,
     /// Drag along the hair.
@@ -92,13 +94,12 @@ pub struct Stage<'a> {
     pub active: Pack,
 }
 
-/// Opens the panel of a node: inertia, contact and friction, drag. `tangent` is the hair's direction there.
+/// Opens the panel of a node: inertia, contact and friction, drag.
 #[inline(always)]
 pub fn open_node<L: Lanes, const D: usize, const ROWS: usize>(
     j: usize,
     node: &Node,
     motion: &Motion,
-    tangent: L3<L>,
     stage: &mut Stage<'_>,
     window: &mut Window<L, D, ROWS>,
     rhs: &mut [Pack; D],
@@ -125,6 +126,7 @@ pub fn open_node<L: Lanes, const D: usize, const ROWS: usize>(
         let air = &air[j];
         let relative = sub3(velocity, load3(&air.velocity));
         let (across, along) = (L::load(&air.across), L::load(&air.along));
+        let tangent = load3::<L>(&air.tangent);
         let more = (along - across) * dot(tangent, relative);
         for r in 0..3 {
             b[r] = across.neg_mul_add(relative[r], more.neg_mul_add(tangent[r], b[r]));

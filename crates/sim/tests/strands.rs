@@ -19,10 +19,10 @@ fn straight(segments: usize) -> Vec<[f64; 3]> {
     (0..=segments).map(|i| [i as f64 / segments as f64, 0.0, 0.0]).collect()
 }
 
-fn released(segments: usize, steps: u32, gamma: f64, tolerance: f64) -> Vec<[f64; 3]> {
+fn released(model: Model, segments: usize, steps: u32, gamma: f64, tolerance: f64) -> Vec<[f64; 3]> {
     let points = straight(segments);
     let settings = Settings {
-        model: Model::Rod,
+        model,
         root: End::Clamped,
         material: material(gamma),
         substeps: Some(steps),
@@ -68,11 +68,17 @@ fn released(segments: usize, steps: u32, gamma: f64, tolerance: f64) -> Vec<[f64
 #[test]
 fn a_horizontal_rod_swings_as_it_should() {
     let exact = [[0.75934, -0.60859], [0.01636, -0.84852], [0.73460, -0.63972]];
-    for (segments, steps) in [(50, 100), (50, 200), (100, 400)] {
-        let tips = released(segments, steps, 9.45, 1e-5);
+    for (model, segments, steps) in [
+        (Model::Rod, 50, 100),
+        (Model::Rod, 50, 200),
+        (Model::Rod, 100, 400),
+        (Model::Springs, 50, 200),
+        (Model::Paper, 50, 1000),
+    ] {
+        let tips = released(model, segments, steps, 9.45, 1e-5);
         for (t, e) in tips.iter().zip(&exact) {
             let error = ((t[0] - e[0]).powi(2) + (t[1] - e[1]).powi(2)).sqrt();
-            assert!(error < 5e-3, "{segments} segments, {steps} steps: {error}");
+            assert!(error < 5e-3, "{model:?} {segments} segments, {steps} steps: {error}");
         }
     }
 }
