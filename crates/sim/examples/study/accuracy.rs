@@ -10,6 +10,9 @@ use std::time::Instant;
 
 const GAMMA: f64 = 9.45;
 
+/// A tolerance that leaves the error of the step alone, radians.
+const TIGHT: f64 = 1e-9;
+
 /// Hair of 70 micrometres without air, internal damping or twist, and the length at which `w L^3 / B` is `gamma`.
 fn hair(gamma: f64) -> (Material, f64) {
     let m = Material { drag_factor: 0.0, damping: 0.0, ..Material::default() };
@@ -79,20 +82,29 @@ pub fn released(write: Write) {
     println!("# continuous limit {limit:?}");
     let issue = [[0.75934, -0.60859], [0.01636, -0.84852], [0.73460, -0.63972]];
     println!("# distance of other published figures from it: {:.1e}", distance(&issue, &limit));
-    println!("segments,steps_per_unit,tip_error_over_L,error_in_time_over_L,order_in_time,us_per_hair,solves_per_step");
+    println!("segments,steps_per_unit,tip_error_over_L,error_in_time_over_L,order_in_time,us_per_hair,solves_per_step,tight_error_in_time,tight_us,tight_solves");
     let (mut time, mut dt, mut alone) = (Vec::new(), Vec::new(), Vec::new());
     on_threads(1, || {
         for segments in [25, 50, 100] {
-            let fine = run(segments, Some(2560), 1e-9);
+            let fine = run(segments, Some(2560), TIGHT);
             let mut last = None;
             let mut lines = [Vec::new(), Vec::new(), Vec::new()];
+            let mut tight = Vec::new();
             for steps in [5, 10, 20, 40, 80, 160, 320, 640] {
                 let r = run(segments, Some(steps), Settings::default().tolerance);
+                let t = run(segments, Some(steps), TIGHT);
+                tight.push([1.0 / f64::from(steps), distance(&t.tips, &fine.tips)]);
                 let (error, own) = (distance(&r.tips, &limit), distance(&r.tips, &fine.tips));
                 let order = last.map_or(f64::NAN, |l: f64| libm::log2(l / own));
                 last = Some(own);
                 let us = r.seconds * 1e6;
-                println!("{segments},{steps},{error:.3e},{own:.3e},{order:.2},{us:.1},{:.2}", r.solves);
+                println!(
+                    "{segments},{steps},{error:.3e},{own:.3e},{order:.2},{us:.1},{:.2},{:.3e},{:.1},{:.2}",
+                    r.solves,
+                    tight.last().expect("just pushed")[1],
+                    t.seconds * 1e6,
+                    t.solves
+                );
                 let step = 1.0 / f64::from(steps);
                 lines[0].push([us * 1e-6, error]);
                 lines[1].push([step, error]);
@@ -110,6 +122,9 @@ pub fn released(write: Write) {
             ] {
                 let s = Series::new(format!("rod, {segments} segments"), std::mem::take(&mut lines[line]));
                 to.push(Series { mark: Some([x, y]), ..s });
+            }
+            if segments == 50 {
+                alone.push(Series::new("50, tolerance 1e-9", tight));
             }
         }
     });
