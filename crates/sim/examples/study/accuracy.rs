@@ -1,10 +1,11 @@
 //! One hair against references: released, at rest, and at different tolerances.
 
-use crate::closed_form::{elastica, spectral};
+use crate::closed_form::{chain, elastica, spectral};
 use crate::common::{GRAVITY, Shot};
 use crate::plot::{Plot, Series};
 use crate::{Write, on_threads};
-use pelage_sim::{Material, Settings};
+use nalgebra::{DMatrix, DVector};
+use pelage_sim::{Material, Model, Settings};
 use std::f64::consts::FRAC_PI_4;
 use std::time::Instant;
 
@@ -32,9 +33,10 @@ struct Run {
     solves: f64,
 }
 
-fn run(segments: usize, substeps: Option<u32>, tolerance: f64) -> Run {
+fn run(model: Model, segments: usize, substeps: Option<u32>, tolerance: f64) -> Run {
     let (material, length) = hair(GAMMA);
     let settings = Settings {
+        model,
         material,
         substeps,
         tolerance,
@@ -86,13 +88,13 @@ pub fn released(write: Write) {
     let (mut time, mut dt, mut alone) = (Vec::new(), Vec::new(), Vec::new());
     on_threads(1, || {
         for segments in [25, 50, 100] {
-            let fine = run(segments, Some(2560), TIGHT);
+            let fine = run(Model::Rod, segments, Some(2560), TIGHT);
             let mut last = None;
             let mut lines = [Vec::new(), Vec::new(), Vec::new()];
             let mut tight = Vec::new();
             for steps in [5, 10, 20, 40, 80, 160, 320, 640] {
-                let r = run(segments, Some(steps), Settings::default().tolerance);
-                let t = run(segments, Some(steps), TIGHT);
+                let r = run(Model::Rod, segments, Some(steps), Settings::default().tolerance);
+                let t = run(Model::Rod, segments, Some(steps), TIGHT);
                 tight.push([1.0 / f64::from(steps), distance(&t.tips, &fine.tips)]);
                 let (error, own) = (distance(&r.tips, &limit), distance(&r.tips, &fine.tips));
                 let order = last.map_or(f64::NAN, |l: f64| libm::log2(l / own));
@@ -110,7 +112,7 @@ pub fn released(write: Write) {
                 lines[1].push([step, error]);
                 lines[2].push([step, own]);
             }
-            let r = run(segments, None, Settings::default().tolerance);
+            let r = run(Model::Rod, segments, None, Settings::default().tolerance);
             let (error, own) = (distance(&r.tips, &limit), distance(&r.tips, &fine.tips));
             println!("{segments},default,{error:.3e},{own:.3e},,{:.1},{:.2}", r.seconds * 1e6, r.solves);
             let (_, length) = hair(GAMMA);
@@ -126,6 +128,27 @@ pub fn released(write: Write) {
             if segments == 50 {
                 alone.push(Series::new("50, tolerance 1e-9", tight));
             }
+        }
+    });
+    on_threads(1, || {
+        println!("model,segments,steps_per_unit,tip_error_over_L,us_per_hair,solves_per_step");
+        for (model, segments, all) in [
+            (Model::Springs, 50, &[5, 10, 20, 40, 80, 160, 320][..]),
+            (Model::Paper, 50, &[80, 160, 320, 640, 1280]),
+        ] {
+            let (mut lines, name) = ([Vec::new(), Vec::new()], format!("{model:?}, {segments} segments").to_lowercase());
+            for &steps in all {
+                let r = run(model, segments, Some(steps), Settings::default().tolerance);
+                let error = distance(&r.tips, &limit);
+                println!("{model:?},{segments},{steps},{error:.3e},{:.1},{:.2}", r.seconds * 1e6, r.solves);
+                if error < 2.0 {
+                    lines[0].push([r.seconds, error]);
+                    lines[1].push([1.0 / f64::from(steps), error]);
+                }
+            }
+            let [a, b] = lines;
+            time.push(Series::new(name.clone(), a));
+            dt.push(Series::new(name, b));
         }
     });
     let guide = vec![[0.0125, 0.5e-4], [0.2, 0.5e-4 * 256.0]];
@@ -189,11 +212,11 @@ pub fn tolerance(write: Write) {
     println!("tolerance,steps_per_unit,error_over_L,solves_per_step");
     let (mut errors, mut solves) = (Vec::new(), Vec::new());
     for steps in [20, 80] {
-        let exact = run(50, Some(steps), 1e-12);
+        let exact = run(Model::Rod, 50, Some(steps), 1e-12);
         let (mut e, mut s) = (Vec::new(), Vec::new());
         for exponent in 2..=9 {
             let tolerance = libm::pow(10.0, -f64::from(exponent));
-            let r = run(50, Some(steps), tolerance);
+            let r = run(Model::Rod, 50, Some(steps), tolerance);
             let error = distance(&r.tips, &exact.tips);
             println!("{tolerance:.0e},{steps},{error:.3e},{:.3}", r.solves);
             e.push([tolerance, error.max(1e-12)]);
@@ -213,4 +236,75 @@ pub fn tolerance(write: Write) {
     let title = "What the tolerance costs in time (ring: default)";
     let axes = [axis, "linear solves a step (two stages)"];
     write("tolerance-solves", Plot { title, axes, log: [true, false], series: solves }.svg());
+}
+
+/// The rod's time integrator (SDIRK2, R. Alexander 1977) on the chain of rigid links in its angles: the same method
+/// without stretching, without lanes, and with Newton's method to rounding.
+fn step_chain(c: &mut chain::Chain, dt: f64) {
+    let n = c.angle.len();
+    let gamma = 1.0 - 0.5f64.sqrt();
+    let h = gamma * dt;
+    let (mut q0, mut v0) = (c.angle.clone(), c.rate.clone());
+    for second in [false, true] {
+        let mut v = v0.clone();
+        let place = |v: &[f64]| -> Vec<f64> { (0..n).map(|i| q0[i] + h * v[i]).collect() };
+        for _ in 0..12 {
+            let f = |v: &[f64]| -> Vec<f64> {
+                let a = c.acceleration(&place(v), v);
+                (0..n).map(|i| v[i] - v0[i] - h * a[i]).collect()
+            };
+            let here = f(&v);
+            let mut jacobian = DMatrix::zeros(n, n);
+            for k in 0..n {
+                let mut moved = v.clone();
+                moved[k] += 1e-6;
+                let there = f(&moved);
+                for i in 0..n {
+                    jacobian[(i, k)] = (there[i] - here[i]) / 1e-6;
+                }
+            }
+            let by = jacobian.lu().solve(&DVector::from_vec(here)).expect("regular");
+            for i in 0..n {
+                v[i] -= by[i];
+            }
+            if by.amax() < 1e-9 {
+                break;
+            }
+        }
+        let (q, a): (Vec<f64>, Vec<f64>) = (place(&v), (0..n).map(|i| (v[i] - v0[i]) / h).collect());
+        if second {
+            (c.angle, c.rate) = (q, v);
+        } else {
+            let rest = dt - h;
+            for i in 0..n {
+                q0[i] = c.angle[i] + rest * v[i];
+                v0[i] = c.rate[i] + rest * a[i];
+            }
+        }
+    }
+}
+
+/// How far the method itself is from the chain it moves.
+pub fn method() {
+    let tips = |steps: u32, n: usize| -> [[f64; 2]; 3] {
+        let mut c = chain::Chain::straight(GAMMA, 0.0, n);
+        std::array::from_fn(|_| {
+            for _ in 0..steps {
+                step_chain(&mut c, 1.0 / f64::from(steps));
+            }
+            c.tip()
+        })
+    };
+    let n = 25;
+    let mut exact = chain::Chain::straight(GAMMA, 0.0, n);
+    let exact: [[f64; 2]; 3] = std::array::from_fn(|_| {
+        exact.advance(1.0, 1.0 / (4.0 * (n * n) as f64 / GAMMA.sqrt()));
+        exact.tip()
+    });
+    println!("steps_per_unit,method_on_rigid_links,rod_tight");
+    for steps in [5, 10, 20, 40, 80, 160, 320] {
+        let fine = run(Model::Rod, n, Some(2560), TIGHT);
+        let rod = run(Model::Rod, n, Some(steps), TIGHT);
+        println!("{steps},{:.3e},{:.3e}", distance(&tips(steps, n), &exact), distance(&rod.tips, &fine.tips));
+    }
 }

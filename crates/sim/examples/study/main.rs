@@ -1,6 +1,6 @@
 //! The study of error against time, and drawings of single hairs: prints CSV, writes SVG.
 //!
-//! `cargo run --release -p pelage-sim --example study -- COMMAND [FOLDER]`, with the command `released`, `cantilever`,
+//! `cargo run --release -p pelage-sim --example study -- COMMAND [FOLDER]`, with the command `released`, `method`, `cantilever`,
 //! `tolerance`, `shot`, `speed`, `many`, or `pictures`; SVG files go to the folder (`docs/pictures`).
 #![allow(missing_docs, clippy::disallowed_methods, clippy::needless_range_loop)]
 
@@ -23,13 +23,14 @@ fn main() {
     };
     match command.as_str() {
         "released" => accuracy::released(&write),
+        "method" => accuracy::method(),
         "cantilever" => accuracy::cantilever(&write),
         "tolerance" => accuracy::tolerance(&write),
         "shot" => shot::halved(&write),
         "many" => shot::many(),
         "speed" => solver::speed(),
         "pictures" => pictures::draw(&write),
-        _ => eprintln!("one of: released cantilever tolerance shot speed many pictures"),
+        _ => eprintln!("one of: released method cantilever tolerance shot speed many pictures"),
     }
 }
 
