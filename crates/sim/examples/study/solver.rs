@@ -1,6 +1,7 @@
 //! What a linear solve costs: counted operations, and conjugate gradients on the same systems.
 
-use crate::on_threads;
+use crate::common::{GRAVITY, Shot};
+use crate::{cpu_seconds, on_threads};
 use pelage_sim::band::{self, Column, HELD, Panel, RING, Window};
 use pelage_sim::group::Strand;
 use pelage_sim::lanes::{self, Kernel, LANES, Lanes, Pack, Width};
@@ -71,26 +72,6 @@ impl Lanes for Counting {
     }
     fn if_gt(a: Self, b: Self, x: Self, y: Self) -> Self {
         if a.0 > b.0 { x } else { y }
-    }
-}
-
-/// Fused multiply-adds without memory: the processor's peak.
-struct Peak(usize);
-
-impl Kernel for Peak {
-    type Out = Pack;
-    #[inline(always)]
-    fn run<L: Lanes>(self) -> Pack {
-        let (f, s) = (L::splat(0.999), L::splat(1e-3));
-        let mut x: [L; 12] = std::array::from_fn(|i| L::splat(std::hint::black_box(i as f64)));
-        for _ in 0..self.0 {
-            for v in &mut x {
-                *v = v.mul_add(f, s);
-            }
-        }
-        let mut out = Pack::default();
-        x.into_iter().fold(L::splat(0.0), |a, b| a + b).store(&mut out);
-        out
     }
 }
 
@@ -259,11 +240,16 @@ fn compare<const D: usize, const ROWS: usize>(name: &str, s: &System<D, ROWS>) {
     let direct = best(200, || lanes::run(width, Direct(s, &mut factor, &mut exact)));
     let per = (n * LANES) as f64;
     let largest = exact[..n].iter().flatten().flat_map(|p| p.0).fold(0.0f64, |a, b| a.max(b.abs()));
+    let few = 100;
+    let mut x = s.rhs.clone();
+    let iterate = || {
+        lanes::run(width, Gradients { system: s, x: &mut x, tolerance: 0.0, most: few });
+    };
+    let each = best(40, iterate) / few as f64;
     let solve = |tolerance: f64, most: usize| {
         let mut x = s.rhs.clone();
-        let start = Instant::now();
         let k = lanes::run(width, Gradients { system: s, x: &mut x, tolerance, most });
-        let t = start.elapsed().as_secs_f64() * 1e9;
+        let t = k as f64 * each;
         let mut off = 0.0f64;
         for (a, b) in x[..n].iter().flatten().zip(exact[..n].iter().flatten()) {
             off = (0..LANES).map(|l| (a.0[l] - b.0[l]).abs()).fold(off, f64::max);
@@ -416,13 +402,33 @@ fn springs_system(dt: f64) -> System<3, 12> {
     s
 }
 
+/// A second of hairs of 20 cm and 50 segments that swing without air, 8 steps a frame: processor time.
+fn strands_in_motion(hairs: usize, wide: bool) {
+    let one: Vec<[f64; 3]> = strands()[1].point.iter().map(|p| [p.x, p.y, p.z]).collect();
+    let material = Material { drag_factor: 0.0, ..Material::default() };
+    let settings = Settings { material, sag_free: false, sleep: false, wide, ..Settings::default() };
+    let mut shot = Shot::new(&vec![one; hairs], &settings, GRAVITY);
+    let (mut t, mut steps, mut solves) = (0.0, 0, 0);
+    for _ in 0..12 {
+        let start = cpu_seconds();
+        shot.wait(1.0 / 24.0);
+        t += (cpu_seconds() - start) * 1e9;
+        steps += shot.last.particle_steps;
+        solves += shot.last.particle_solves;
+    }
+    println!(
+        "{hairs} hairs x 50, wide {wide}: {:.1} ns a node and step, {:.1} ns a node and solve, {:.2} solves a step",
+        t / steps as f64,
+        t / solves as f64,
+        solves as f64 / steps as f64
+    );
+}
+
 pub fn speed() {
     on_threads(1, || {
-        let rounds = 2_000_000;
-        let peak = (rounds * 12 * 2 * LANES) as f64 / best(3, || {
-            std::hint::black_box(lanes::run(Width::best(), Peak(rounds)));
-        });
-        println!("peak of fused multiply-adds, one thread: {peak:.1} Gflop/s");
+        for (hairs, wide) in [(64, true), (64, false)] {
+            strands_in_motion(hairs, wide);
+        }
         let it = Iteration::new(1.0 / 192.0);
         let n = it.group.node.len();
         let mut scratch = Scratch::default();
