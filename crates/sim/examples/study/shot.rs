@@ -131,7 +131,7 @@ pub fn many() {
     let count = std::env::args().nth(3).and_then(|v| v.parse().ok()).unwrap_or(10_000);
     let field = ball();
     let hairs = tuft(count, 0.2, 50);
-    let frames = if count > 20_000 { 4 } else { 24 };
+    let frames = if count > 20_000 { 2 } else { 4 };
     on_threads(2, || {
         for solid in [true, false] {
             let start = Instant::now();
