@@ -83,7 +83,9 @@ pub fn released(write: Write) {
     println!("# continuous limit {limit:?}");
     let issue = [[0.75934, -0.60859], [0.01636, -0.84852], [0.73460, -0.63972]];
     println!("# distance of other published figures from it: {:.1e}", distance(&issue, &limit));
-    println!("segments,steps_per_unit,tip_error_over_L,error_in_time_over_L,order_in_time,us_per_hair,solves_per_step,tight_error_in_time,tight_us,tight_solves");
+    println!(
+        "segments,steps_per_unit,tip_error_over_L,error_in_time_over_L,order_in_time,us_per_hair,solves_per_step,tight_error_in_time,tight_us,tight_solves"
+    );
     let (mut time, mut dt, mut alone) = (Vec::new(), Vec::new(), Vec::new());
     on_threads(1, || {
         for segments in [25, 50, 100] {
@@ -116,11 +118,9 @@ pub fn released(write: Write) {
             println!("{segments},default,{error:.3e},{own:.3e},,{:.1},{:.2}", r.seconds * 1e6, r.solves);
             let (_, length) = hair(GAMMA);
             let step = 1.0 / ((length / 9.81).sqrt() * 192.0).ceil();
-            for (to, x, y, line) in [
-                (&mut time, r.seconds, error, 0),
-                (&mut dt, step, error, 1),
-                (&mut alone, step, own, 2),
-            ] {
+            for (to, x, y, line) in
+                [(&mut time, r.seconds, error, 0), (&mut dt, step, error, 1), (&mut alone, step, own, 2)]
+            {
                 let s = Series::new(format!("rod, {segments} segments"), std::mem::take(&mut lines[line]));
                 to.push(Series { mark: Some([x, y]), ..s });
             }
@@ -131,11 +131,11 @@ pub fn released(write: Write) {
     });
     on_threads(1, || {
         println!("model,segments,steps_per_unit,tip_error_over_L,us_per_hair,solves_per_step");
-        for (model, segments, all) in [
-            (Model::Springs, 50, &[20, 40, 80, 160][..]),
-            (Model::Paper, 50, &[160, 320, 640, 1280]),
-        ] {
-            let (mut lines, name) = ([Vec::new(), Vec::new()], format!("{model:?}, {segments} segments").to_lowercase());
+        for (model, segments, all) in
+            [(Model::Springs, 50, &[20, 40, 80, 160][..]), (Model::Paper, 50, &[160, 320, 640, 1280])]
+        {
+            let (mut lines, name) =
+                ([Vec::new(), Vec::new()], format!("{model:?}, {segments} segments").to_lowercase());
             for &steps in all {
                 let r = run(model, segments, Some(steps), Settings::default().tolerance);
                 let error = distance(&r.tips, &limit);

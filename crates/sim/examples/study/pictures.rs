@@ -40,7 +40,10 @@ fn looped(write: Write) {
     let mut shot = Shot::new(std::slice::from_ref(&points), &own, gravity);
     let tip = |t: f64| {
         let angle = 0.5 * 1.6 * TAU * t;
-        Root { position: [length * (1.0 - 0.75 * t), 0.0, 0.0], rotation: [libm::sin(angle), 0.0, 0.0, libm::cos(angle)] }
+        Root {
+            position: [length * (1.0 - 0.75 * t), 0.0, 0.0],
+            rotation: [libm::sin(angle), 0.0, 0.0, libm::cos(angle)],
+        }
     };
     let frames = 96;
     let mut panels = vec![("ends 10 cm apart".to_string(), vec![flat(&shot)])];
@@ -64,17 +67,20 @@ fn looped(write: Write) {
             println!("loop: frame {frame}, strain {:.1e}, held {}", r.largest_strain, r.held.len());
         }
     }
-    write("hair-loop", drawing("A hair clamped at both ends, pushed together and twisted, buckles into a loop", &panels));
+    write(
+        "hair-loop",
+        drawing("A hair clamped at both ends, pushed together and twisted, buckles into a loop", &panels),
+    );
 }
 
 pub fn draw(write: Write) {
     looped(write);
     let hang = [0.0, -1.0];
     // Under changing gravity: pulled straight, then let go.
-    let mut shot = Shot::new(&[helix(0.004, 0.02, hang)], &settings(20.0), [0.0; 3]);
+    let mut shot = Shot::new(&[helix(0.004, 0.02, hang)], &settings(2.0), [0.0; 3]);
     let mut panels = vec![("natural shape".to_string(), vec![flat(&shot)])];
     for (gravity, seconds, name) in [
-        (400.0, 1.5, "stretched by 400 m/s2"),
+        (150.0, 1.5, "stretched by 150 m/s2"),
         (9.81, 1.0 / 48.0, "1/48 s after letting go"),
         (9.81, 1.0 / 24.0, "1/16 s after"),
         (9.81, 2.0, "2 s after (9.81 m/s2)"),
@@ -86,7 +92,7 @@ pub fn draw(write: Write) {
         println!("curl: {name}: tip {:.4} m below, strain {:.1e}", -shot.tip(0).y, shot.last.largest_strain);
         panels.push((name.to_string(), vec![flat(&shot)]));
     }
-    write("hair-curl", drawing("A curl (stiffness x 20) stretched by gravity and let go", &panels));
+    write("hair-curl", drawing("A curl (stiffness x 2) stretched by gravity and let go", &panels));
     let mut panels = Vec::new();
     for bend in [0.2, 1.0, 5.0, 25.0] {
         let mut shot = Shot::new(&[helix(0.004, 0.02, [1.0, 0.0])], &settings(bend), [0.0, -9.81, 0.0]);

@@ -94,7 +94,8 @@ impl Plot<'_> {
         let all = |c: usize| self.series.iter().flat_map(move |s| s.points.iter().chain(&s.mark).map(move |p| p[c]));
         let axis = [Axis::new(all(0), self.log[0]), Axis::new(all(1), self.log[1])];
         let [left, top, right, bottom] = FRAME;
-        let place = |p: [f64; 2]| [left + (right - left) * axis[0].at(p[0]), bottom - (bottom - top) * axis[1].at(p[1])];
+        let place =
+            |p: [f64; 2]| [left + (right - left) * axis[0].at(p[0]), bottom - (bottom - top) * axis[1].at(p[1])];
         let mut out = String::new();
         let o = &mut out;
         let _ = writeln!(
@@ -126,7 +127,8 @@ impl Plot<'_> {
             );
         }
         let (w, h) = (right - left, bottom - top);
-        let _ = writeln!(o, "<rect x=\"{left}\" y=\"{top}\" width=\"{w}\" height=\"{h}\" fill=\"none\" stroke=\"#333\"/>");
+        let _ =
+            writeln!(o, "<rect x=\"{left}\" y=\"{top}\" width=\"{w}\" height=\"{h}\" fill=\"none\" stroke=\"#333\"/>");
         let _ = writeln!(
             o,
             "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">{}</text>\
@@ -178,17 +180,18 @@ impl Plot<'_> {
 /// Hairs side by side as projected lines, each panel with a caption. Coordinates: right, up.
 pub fn drawing(title: &str, panels: &[(String, Vec<Vec<[f64; 2]>>)]) -> String {
     let each = 190.0;
-    let (width, height) = (each * panels.len() as f64 + 20.0, 330.0);
+    let width = each * panels.len() as f64 + 20.0;
+    let mut bound = [f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY, f64::NEG_INFINITY];
+    for p in panels.iter().flat_map(|p| p.1.iter().flatten()) {
+        bound = [bound[0].min(p[0]), bound[1].max(p[0]), bound[2].min(p[1]), bound[3].max(p[1])];
+    }
+    let scale = ((each - 24.0) / (bound[1] - bound[0])).min((330.0 - 80.0) / (bound[3] - bound[2]));
+    let height = 80.0 + scale * (bound[3] - bound[2]);
     let mut out = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" \
          font-size=\"12\"><rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\
          <text x=\"14\" y=\"24\" font-size=\"15\" font-weight=\"bold\">{title}</text>\n"
     );
-    let mut bound = [f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY, f64::NEG_INFINITY];
-    for p in panels.iter().flat_map(|p| p.1.iter().flatten()) {
-        bound = [bound[0].min(p[0]), bound[1].max(p[0]), bound[2].min(p[1]), bound[3].max(p[1])];
-    }
-    let scale = ((each - 24.0) / (bound[1] - bound[0])).min((height - 80.0) / (bound[3] - bound[2]));
     for (k, (caption, lines)) in panels.iter().enumerate() {
         let x0 = 10.0 + each * (k as f64 + 0.5) - 0.5 * scale * (bound[0] + bound[1]);
         let y0 = 42.0 + scale * bound[3];

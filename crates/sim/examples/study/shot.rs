@@ -76,7 +76,9 @@ pub fn halved(write: Write) {
     let (length, segments) = (0.2, 40);
     let hairs = tuft(200, length, segments);
     let mut series = Vec::new();
-    println!("body,substeps,rms_all,frame_rms_median,frame_rms_p95,hair_rms_median,hair_rms_p95,seconds,strands_halved");
+    println!(
+        "body,substeps,rms_all,frame_rms_median,frame_rms_p95,hair_rms_median,hair_rms_p95,seconds,strands_halved"
+    );
     for (name, body) in [("free", None), ("ball", Some(&field))] {
         let mut coarse = play(&hairs, 4, body);
         let (mut all, mut median, mut high) = (Vec::new(), Vec::new(), Vec::new());

@@ -82,7 +82,11 @@ struct System<const D: usize, const ROWS: usize> {
 }
 
 /// Elimination and substitution of an assembled system; the solution.
-struct Direct<'a, const D: usize, const ROWS: usize>(&'a System<D, ROWS>, &'a mut [Column<D, ROWS>], &'a mut [[Pack; D]]);
+struct Direct<'a, const D: usize, const ROWS: usize>(
+    &'a System<D, ROWS>,
+    &'a mut [Column<D, ROWS>],
+    &'a mut [[Pack; D]],
+);
 
 impl<const D: usize, const ROWS: usize> Kernel for Direct<'_, D, ROWS> {
     type Out = ();
