@@ -1,0 +1,127 @@
+//! Drawings of single hairs (Selle, Lentine, Fedkiw 2008, Figures 10 and 11 show such tests).
+
+use crate::Write;
+use crate::common::{Shot, still};
+use crate::plot::drawing;
+use pelage_sim::{Body, End, Material, Root, Settings, Span};
+use std::f64::consts::{PI, TAU};
+
+const FRAME: f64 = 1.0 / 24.0;
+
+/// A wavy or curly hair along `x`: a helix around its axis, `radius` and `pitch` in metres; 12 cm along the axis.
+fn helix(radius: f64, pitch: f64, direction: [f64; 2]) -> Vec<[f64; 3]> {
+    (0..=120)
+        .map(|i| {
+            let s = 0.12 * f64::from(i) / 120.0;
+            // The curl grows from nothing, so that the root points along the axis.
+            let r = radius * (s / 0.02).min(1.0);
+            let (sin, cos) = libm::sincos(TAU * s / pitch);
+            let up = r * (1.0 - cos);
+            [direction[0] * s - direction[1] * up, direction[1] * s + direction[0] * up, r * sin]
+        })
+        .collect()
+}
+
+fn settings(bend: f64) -> Settings {
+    let material = Material { bend_factor: bend, twist_factor: bend, ..Material::default() };
+    Settings { sag_free: false, sleep: false, material, ..Settings::default() }
+}
+
+fn flat(shot: &Shot) -> Vec<[f64; 2]> {
+    shot.hair(0).iter().map(|p| [p.x + 0.25 * p.z, p.y + 0.1 * p.z]).collect()
+}
+
+/// A straight hair whose clamped tip is pushed towards the root and turned about its axis.
+fn looped(write: Write) {
+    let length = 0.1;
+    let points: Vec<[f64; 3]> = (0..=60).map(|i| [length * f64::from(i) / 60.0, 0.0, 0.0]).collect();
+    let own = Settings { tip: End::Clamped, ..settings(1.0) };
+    let gravity = [0.0, -0.3, 0.0];
+    let mut shot = Shot::new(std::slice::from_ref(&points), &own, gravity);
+    let tip = |t: f64| {
+        let angle = 0.5 * 1.6 * TAU * t;
+        Root {
+            position: [length * (1.0 - 0.75 * t), 0.0, 0.0],
+            rotation: [libm::sin(angle), 0.0, 0.0, libm::cos(angle)],
+        }
+    };
+    let frames = 96;
+    let mut panels = vec![("ends 10 cm apart".to_string(), vec![flat(&shot)])];
+    for frame in 0..frames {
+        let at = |k: usize| [tip(k as f64 / frames as f64)];
+        let (a, b) = (at(frame), at(frame + 1));
+        let span = Span {
+            seconds: FRAME,
+            time: 0.0,
+            motion: &still,
+            roots: [&shot.roots, &shot.roots],
+            tips: Some([&a, &b]),
+            body: &Body::default(),
+            gravity: [gravity; 2],
+            wind: None,
+        };
+        let r = shot.sim.advance(&span, &|_| true).expect("runs on");
+        if (frame + 1) % 24 == 0 {
+            let t = (frame + 1) as f64 / frames as f64;
+            panels.push((format!("{:.1} cm, {:.1} turns", 10.0 * (1.0 - 0.75 * t), 1.6 * t), vec![flat(&shot)]));
+            println!("loop: frame {frame}, strain {:.1e}, held {}", r.largest_strain, r.held.len());
+        }
+    }
+    write(
+        "hair-loop",
+        drawing("A hair clamped at both ends, pushed together and twisted, buckles into a loop", &panels),
+    );
+}
+
+pub fn draw(write: Write) {
+    looped(write);
+    let hang = [0.0, -1.0];
+    // Under changing gravity: pulled straight, then let go.
+    let mut shot = Shot::new(&[helix(0.004, 0.02, hang)], &settings(2.0), [0.0; 3]);
+    let mut panels = vec![("natural shape".to_string(), vec![flat(&shot)])];
+    for (gravity, seconds, name) in [
+        (150.0, 1.5, "stretched by 150 m/s2"),
+        (9.81, 1.0 / 48.0, "1/48 s after letting go"),
+        (9.81, 1.0 / 24.0, "1/16 s after"),
+        (9.81, 2.0, "2 s after (9.81 m/s2)"),
+    ] {
+        shot.gravity = [0.0, -gravity, 0.0];
+        for _ in 0..(seconds / FRAME).ceil() as usize {
+            shot.wait(seconds / (seconds / FRAME).ceil());
+        }
+        println!("curl: {name}: tip {:.4} m below, strain {:.1e}", -shot.tip(0).y, shot.last.largest_strain);
+        panels.push((name.to_string(), vec![flat(&shot)]));
+    }
+    write("hair-curl", drawing("A curl (stiffness x 2) stretched by gravity and let go", &panels));
+    let mut panels = Vec::new();
+    for bend in [0.2, 1.0, 5.0, 25.0] {
+        let mut shot = Shot::new(&[helix(0.004, 0.02, [1.0, 0.0])], &settings(bend), [0.0, -9.81, 0.0]);
+        let mut lines = vec![flat(&shot)];
+        for frame in 1..=48 {
+            shot.wait(FRAME);
+            if [1, 2, 4, 48].contains(&frame) {
+                lines.push(flat(&shot));
+            }
+        }
+        println!("dropped: stiffness {bend}: tip {:?}, strain {:.1e}", shot.tip(0), shot.last.largest_strain);
+        panels.push((format!("stiffness x {bend}"), lines));
+    }
+    let title = "A curly hair dropped: after 0, 1/24, 2/24, 4/24, 2 s (dark)";
+    write("hair-stiffness", drawing(title, &panels));
+    let mut panels = Vec::new();
+    for radius in [0.0, 0.001, 0.002, 0.004] {
+        let direction = [libm::cos(0.25 * PI), libm::sin(0.25 * PI)];
+        let mut shot = Shot::new(&[helix(radius, 0.015, direction)], &settings(4.0), [0.0, -9.81, 0.0]);
+        let mut lines = vec![flat(&shot)];
+        for frame in 1..=72 {
+            shot.wait(FRAME);
+            if [2, 4, 72].contains(&frame) {
+                lines.push(flat(&shot));
+            }
+        }
+        println!("waviness {radius}: tip {:?}, strain {:.1e}", shot.tip(0), shot.last.largest_strain);
+        panels.push((format!("waves of {} mm", radius * 1e3), lines));
+    }
+    let title = "More waves, dropped: after 0, 2/24, 4/24, 3 s (dark); stiffness x 4";
+    write("hair-waviness", drawing(title, &panels));
+}
