@@ -45,6 +45,7 @@ fn kind(root: &Value, v: &Value) -> String {
     };
     match types.first().copied() {
         Some("array") => match v["maxItems"].as_u64() {
+            Some(n) if v["items"]["type"] == "array" => format!("{n} times {}", kind(root, &v["items"])),
             Some(n) => format!("{n} {}s", kind(root, &v["items"])),
             None => format!("list of {}", kind(root, &v["items"])),
         },

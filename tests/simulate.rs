@@ -307,12 +307,12 @@ fn the_skin_and_other_meshes_keep_hair_out() {
     shot.edit(
         SHOT,
         "motion = \"grooms/ball.csv\"\n\n[export]",
-        "motion = \"grooms/ball.csv\"\nshape = \"ellipsoid\"\n\n[export]",
+        "motion = \"grooms/ball.csv\"\nkind = \"ellipsoid\"\n\n[export]",
     );
     let (_, reasons) = shot.plan(&[]);
     assert_eq!(
         reasons.into_iter().collect::<Vec<_>>(),
-        ["pipeline.toml: simulate.body.mesh[0].shape Field -> Ellipsoid"]
+        ["pipeline.toml: simulate.body.mesh[0].kind field -> ellipsoid"]
     );
     shot.report(&[]);
     let fresh = shot.fresh();
@@ -321,7 +321,6 @@ fn the_skin_and_other_meshes_keep_hair_out() {
 }
 
 #[test]
-#[ignore = "soft hair in contact gives other bytes for another number of threads: not located yet, without a body it does not"]
 fn threads_do_not_show_in_soft_hair_in_contact() {
     let shot = simulated_shot(COMMAND, 4);
     shot.edit(SHOT, "segments = 8", "segments = 8\nsag_free = false");

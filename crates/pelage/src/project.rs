@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::cache::FileHashes;
-use crate::config::{BodyMesh, Document, Feature, GroomFile, Material, MeshShape, SEGMENTS, ShotFile, Target};
+use crate::config::{BodyKind, BodyMesh, Document, Feature, GroomFile, Material, SEGMENTS, ShotFile, Target};
 use crate::format::csv;
 use pelage_geom::RigidMotion;
 use pelage_geom::motion::RigidTransform;
@@ -83,7 +83,9 @@ pub struct BodyFile {
     /// The mesh.
     pub file: InputFile,
     /// What stands for it.
-    pub shape: MeshShape,
+    pub kind: BodyKind,
+    /// Where its table stands, scene units; `None`: by its bounds.
+    pub axis: Option<[[f64; 3]; 2]>,
     /// Its motion, if it moves.
     pub motion: Option<SkinMotion>,
 }
@@ -345,7 +347,8 @@ impl Finder<'_> {
             let file = self.file(doc, &key("file"), &m.file)?;
             let path = m.motion.as_ref();
             let motion = path.map(|p| self.table(doc, &key("motion"), p, m.motion_start, m.pivot)).transpose()?;
-            Ok(BodyFile { file, shape: m.shape, motion })
+            let kind = m.kind.unwrap_or(doc.value.simulate.body.kind);
+            Ok(BodyFile { file, kind, axis: m.axis, motion })
         };
         meshes.map(body).collect()
     }

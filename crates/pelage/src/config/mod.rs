@@ -14,7 +14,7 @@ pub use shot::{CacheSettings, Export, ExportFormat, GroomRef, Preview, Shot, Sho
 pub use simulate::{
     Amount, Key, Keyed, Material, SEGMENTS, Simulate, StrandModel, Target, Vector, WindSettings, check_material,
 };
-pub use simulate::{BodyMesh, BodySettings, MeshShape};
+pub use simulate::{BodyKind, BodyMesh, BodySettings};
 
 /// JSON Schema (draft 2020-12) of a shot file or a groom file, for editors.
 pub fn schema<T: schemars::JsonSchema>() -> String {

@@ -1,6 +1,6 @@
 //! How hair is simulated: `[simulate]` of the shot file, and what a layer's hair is made of.
 
-use super::document::{ConfigError, Document, exactly};
+use super::document::{ConfigError, Document, Fixed, exactly};
 use super::{ShotFile, UpAxis};
 use schemars::JsonSchema;
 use serde::de::{DeserializeOwned, Deserializer, Error as _};
@@ -160,6 +160,10 @@ impl WindSettings {
     }
 }
 
+fn two_points<'de, D: Deserializer<'de>>(d: D) -> Result<Option<[[f64; 3]; 2]>, D::Error> {
+    exactly(d).map(|points: [Fixed<f64, 3>; 2]| Some(points.map(|p| p.0)))
+}
+
 /// What hair can't enter.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -172,6 +176,12 @@ pub struct BodySettings {
     pub outside: f64,
     /// Distance inside a surface up to which its field is exact, millimetres. Default: 10.
     pub inside: f64,
+    /// What stands for the skin and for meshes that do not say otherwise. Default: "field", which a skin that deforms must be.
+    pub kind: BodyKind,
+    /// Axis of the skin's cylinder or sphere in its rest pose: from where to where, scene units; a sphere stands around
+    /// its middle. Default: through the middle of its bounds, along up.
+    #[serde(default, deserialize_with = "two_points")]
+    pub axis: Option<[[f64; 3]; 2]>,
     /// Other meshes.
     pub mesh: Vec<BodyMesh>,
 }
@@ -180,7 +190,7 @@ impl Default for BodySettings {
     fn default() -> Self {
         let f = pelage_sim::body::FieldSettings::default();
         let [voxel, outside, inside] = [f.voxel, f.outside, f.inside].map(|x| x * 1e3);
-        BodySettings { skin: true, voxel, outside, inside, mesh: Vec::new() }
+        BodySettings { skin: true, voxel, outside, inside, kind: BodyKind::Field, axis: None, mesh: Vec::new() }
     }
 }
 
@@ -190,9 +200,12 @@ impl Default for BodySettings {
 pub struct BodyMesh {
     /// PLY, scene units.
     pub file: std::path::PathBuf,
-    /// What stands for it. Default: "field".
-    #[serde(default)]
-    pub shape: MeshShape,
+    /// What stands for it. Default: as `simulate.body.kind` says.
+    pub kind: Option<BodyKind>,
+    /// Axis of its cylinder or sphere: from where to where, scene units. Default: through the middle of its bounds,
+    /// along up.
+    #[serde(default, deserialize_with = "two_points")]
+    pub axis: Option<[[f64; 3]; 2]>,
     /// CSV of its rigid motion, as for `skin.motion`. Default: it stays.
     pub motion: Option<std::path::PathBuf>,
     /// The frame at which that motion's time is 0. Default: the shot's first frame.
@@ -202,15 +215,37 @@ pub struct BodyMesh {
     pub pivot: [f64; 3],
 }
 
-/// What stands for a mesh.
+/// What stands for a mesh. Whatever it is, points that end a frame inside the mesh itself come out of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum MeshShape {
+pub enum BodyKind {
     /// A distance field of it.
     #[default]
     Field,
-    /// The ellipsoid around its vertices: cheap, for what is about as round.
+    /// A table of its radius over azimuth and height around an axis: what a ray to the axis does not see is filled.
+    Cylinder,
+    /// A table of its radius over two angles around a centre: what a ray to the centre does not see is filled.
+    Sphere,
+    /// The ellipsoid around its vertices, for the skin one of the same inertia, which cuts through it: cheap, for what
+    /// is about as round.
     Ellipsoid,
+}
+
+impl BodyKind {
+    /// As written in the shot file.
+    pub fn name(self) -> &'static str {
+        match self {
+            BodyKind::Field => "field",
+            BodyKind::Cylinder => "cylinder",
+            BodyKind::Sphere => "sphere",
+            BodyKind::Ellipsoid => "ellipsoid",
+        }
+    }
+
+    /// True if it stands on an axis.
+    pub fn is_table(self) -> bool {
+        matches!(self, BodyKind::Cylinder | BodyKind::Sphere)
+    }
 }
 
 /// Three numbers.
@@ -438,6 +473,10 @@ impl Document<ShotFile> {
         }
         let up = self.value.shot.up;
         self.keys("simulate.gravity", &s.gravity.downward(up), 1e6, "9.81 is the earth's, in m/s2")?;
+        // They are there strand by strand (`pelage_sim::springs`), but layers of hair step as rods.
+        if s.model != StrandModel::Rod {
+            return Err(self.error("simulate.model", "is not simulated in a shot yet", "leave it out, or say \"rod\""));
+        }
         self.check_body()?;
         let Some(wind) = &s.wind else { return Ok(()) };
         let three = |k: &Keyed<f64>| Keyed(k.0.iter().map(|k| Key { frame: k.frame, value: [k.value; 3] }).collect());
@@ -458,7 +497,29 @@ impl Document<ShotFile> {
             range(self, &format!("simulate.body.{name}"), x, low, 1e6, "it is in millimetres")?;
         }
         for (i, m) in b.mesh.iter().enumerate() {
-            self.check_motion(&format!("simulate.body.mesh[{i}]"), m.motion_start, m.pivot)?;
+            let key = format!("simulate.body.mesh[{i}]");
+            self.check_motion(&key, m.motion_start, m.pivot)?;
+            self.check_axis(&key, m.axis)?;
+        }
+        self.check_axis("simulate.body", b.axis)?;
+        let deforms = self.value.skin.as_ref().is_some_and(|s| s.frames.is_some());
+        if b.skin && deforms && b.kind != BodyKind::Field {
+            let what = format!("is \"{}\", but the skin deforms, and only fields do", b.kind.name());
+            return Err(self.error(
+                "simulate.body.kind",
+                what,
+                "leave it out, and give the meshes a kind of their own",
+            ));
+        }
+        Ok(())
+    }
+
+    fn check_axis(&self, key: &str, axis: Option<[[f64; 3]; 2]>) -> Result<(), ConfigError> {
+        let Some([from, to]) = axis else { return Ok(()) };
+        let finite = from.iter().chain(&to).all(|x| x.abs() <= 1e18);
+        if !finite || from == to {
+            let help = "two points: from where to where, scene units";
+            return Err(self.error(&format!("{key}.axis"), "has no direction", help));
         }
         Ok(())
     }

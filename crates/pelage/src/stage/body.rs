@@ -3,46 +3,67 @@
 use super::groom;
 use super::run::Runner;
 use crate::Error;
-use crate::config::MeshShape;
+use crate::config::{BodyKind, UpAxis};
 use crate::format::ply;
 use crate::project::SkinMotion;
 use crate::timeline::Timeline;
-use pelage_geom::{Bvh, Mesh, Topology};
-use pelage_sim::body::{Closed, Ellipsoid, Exact, FieldSettings, Flow};
-use pelage_sim::body::{Deforming, Field};
-use pelage_sim::{Body, Part, Rigid, Shape};
+use pelage_geom::{Bvh, Mesh, Topology, Vec3};
+use pelage_sim::body::{Closed, Deforming, Ellipsoid, Exact, Field, FieldSettings, Flow, rigid_fit};
+use pelage_sim::{Body, Bounds, Part, Rigid, Shape, Table};
 use std::rc::Rc;
 
-/// A mesh with its holes closed, in metres.
-struct Solid {
-    closed: Closed,
-}
+/// Samples of a table around and along: on a head 3 mm apart. Half as many round a nose off; twice as many take longer to
+/// make than a field.
+const TABLE: [usize; 2] = [256, 128];
 
-/// A solid's surface at one moment.
+/// A solid's surface at one moment, metres.
 struct Surface {
     position: Vec<[f64; 3]>,
     bvh: Bvh,
-    field: Field,
+}
+
+/// What stands for a solid.
+enum Stand {
+    Field(Field),
+    Table(Table),
+    Ellipsoid(Ellipsoid),
 }
 
 /// A solid that moves as a whole.
 struct RigidSolid {
-    solid: Solid,
+    solid: Closed,
     surface: Surface,
-    ellipsoid: Option<Ellipsoid>,
+    stand: Stand,
     /// Its motion; `None`: that of the skin.
     motion: Option<Option<SkinMotion>>,
 }
 
-/// Everything that hair can't enter in a shot, made once a run.
+/// What the rigid part of a deforming skin's motion goes by.
+struct Anchor {
+    /// Vertices of the skin that hair can touch, and their places at rest, metres.
+    vertex: Vec<usize>,
+    rest: Vec<[f64; 3]>,
+    /// Their middle: what goes straight ahead between frames.
+    middle: Vec3,
+}
+
+/// Everything that hair can't enter in a shot, made once a run and layer.
 pub(super) struct Colliders {
     settings: FieldSettings,
     rigid: Vec<RigidSolid>,
-    /// The skin, if it deforms.
-    skin: Option<Solid>,
+    /// The skin, if it deforms and is a body.
+    skin: Option<Closed>,
+    /// `None` if the skin doesn't deform.
+    anchor: Option<Anchor>,
 }
 
-/// A deforming skin over a span: its surfaces at both ends, and how they move.
+/// A deforming skin at a frame.
+pub(super) struct End {
+    surface: Surface,
+    field: Field,
+}
+
+/// A deforming skin over a span: its surfaces at both ends, and how they move in the coordinates of its rigid part.
 pub(super) struct Moving {
     seconds: f64,
     ends: [Rc<End>; 2],
@@ -50,87 +71,184 @@ pub(super) struct Moving {
     velocity: Vec<[f64; 3]>,
 }
 
-/// A deforming skin at a frame.
-pub(super) struct End {
-    surface: Surface,
-}
-
-impl Solid {
-    fn new(mesh: &Mesh, topology: &Topology) -> Self {
-        Solid { closed: Closed::new(mesh, topology) }
+impl Surface {
+    /// Of a solid whose mesh has its vertices at `position`, metres.
+    fn new(solid: &Closed, position: &[[f64; 3]]) -> Self {
+        let position = solid.extend(position);
+        let bvh = Bvh::build(&position, &solid.mesh.triangle, &solid.topology);
+        Surface { position, bvh }
     }
 
-    /// The solid with the mesh's vertices at `position`, scene units of `unit` metres.
-    fn at(&self, position: &[[f64; 3]], unit: f64, settings: &FieldSettings) -> Surface {
-        let metres: Vec<[f64; 3]> = position.iter().map(|p| p.map(|x| x * unit)).collect();
-        let position = self.closed.extend(&metres);
-        let (triangle, topology) = (&self.closed.mesh.triangle, &self.closed.topology);
-        let bvh = Bvh::build(&position, triangle, topology);
-        let field = Field::build(&position, triangle, topology, &bvh, settings, None);
-        Surface { position, bvh, field }
+    fn field(&self, solid: &Closed, settings: &FieldSettings, region: Option<Bounds>) -> Field {
+        Field::build(&self.position, &solid.mesh.triangle, &solid.topology, &self.bvh, settings, region)
     }
 }
 
-/// What the shot has of bodies.
-pub(super) fn colliders(run: &mut Runner<'_>, deforms: bool) -> Result<Rc<Colliders>, Error> {
-    if let Some(found) = &run.colliders {
+fn metres(position: &[[f64; 3]], unit: f64) -> Vec<[f64; 3]> {
+    position.iter().map(|p| p.map(|x| x * unit)).collect()
+}
+
+/// A table around an axis in metres, or around the middle of the points along `up`; holds every point that is finite and,
+/// in a cylinder, between its ends.
+fn table(surface: &Surface, kind: BodyKind, axis: Option<[Vec3; 2]>, up: UpAxis) -> Table {
+    let points = || surface.position.iter().map(|p| Vec3::from(*p)).filter(|p| p.iter().all(|x| x.is_finite()));
+    let [from, to] = axis.unwrap_or_else(|| {
+        let start = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
+        let (low, high) = points().fold(start, |(low, high), p| (low.inf(&p), high.sup(&p)));
+        let (middle, along) = ((low + high) * 0.5, if up == UpAxis::Y { Vec3::y() } else { Vec3::z() });
+        let half = along * (0.5 * along.dot(&(high - low)));
+        [middle - half, middle + half]
+    });
+    let along = (to - from).try_normalize(0.0).unwrap_or_else(Vec3::y);
+    // A hair's breadth more, so that rays begin outside.
+    let farthest = |far: &dyn Fn(Vec3) -> f64| 1.001 * points().map(far).fold(1e-6, f64::max);
+    if kind == BodyKind::Sphere {
+        let centre = (from + to) * 0.5;
+        return Table::sphere(&surface.bvh, centre, along, farthest(&|p| (p - centre).norm()), TABLE);
+    }
+    let across = |p: Vec3| (p - from - along * along.dot(&(p - from))).norm();
+    Table::cylinder(&surface.bvh, from, to, farthest(&across), TABLE)
+}
+
+/// What the shot has of bodies around the hair of a layer, whose roots at rest and longest hair give `region` (metres).
+pub(super) fn colliders(
+    run: &mut Runner<'_>,
+    layer: usize,
+    deforms: bool,
+    region: Option<Bounds>,
+) -> Result<Rc<Colliders>, Error> {
+    if let Some((_, found)) = run.colliders.as_ref().filter(|(of, _)| *of == layer) {
         return Ok(found.clone());
     }
     let shot = &run.project.shot.value;
-    let (unit, b) = (shot.shot.meters_per_unit, &shot.simulate.body);
+    let (unit, up, b) = (shot.shot.meters_per_unit, shot.shot.up, &shot.simulate.body);
     let settings = FieldSettings { voxel: b.voxel * 1e-3, outside: b.outside * 1e-3, inside: b.inside * 1e-3 };
-    let mut out = Colliders { settings, rigid: Vec::new(), skin: None };
-    if b.skin && run.project.rest.is_some() {
+    let in_metres = |axis: Option<[[f64; 3]; 2]>| axis.map(|a| a.map(|p| Vec3::from(p) * unit));
+    let mut out = Colliders { settings, rigid: Vec::new(), skin: None, anchor: None };
+    if run.project.rest.is_some() && (b.skin || deforms) {
         let skin = groom::skin(run)?;
-        let solid = Solid::new(&skin.mesh, &skin.topology);
-        note_holes(run, "the skin", &solid);
-        if deforms {
-            out.skin = Some(solid);
-        } else {
-            let surface = solid.at(&skin.mesh.position, unit, &settings);
-            out.rigid.push(RigidSolid { solid, surface, ellipsoid: None, motion: None });
+        let rest = metres(&skin.mesh.position, unit);
+        out.anchor = deforms.then(|| Anchor::new(&rest, region));
+        if b.skin {
+            let solid = closed(run, "the skin", &skin.mesh, &skin.topology);
+            if deforms {
+                out.skin = Some(solid);
+            } else {
+                let surface = Surface::new(&solid, &rest);
+                let stand = match b.kind {
+                    BodyKind::Field => Stand::Field(surface.field(&solid, &settings, region)),
+                    BodyKind::Ellipsoid => Stand::Ellipsoid(ellipsoid(&surface)),
+                    kind => Stand::Table(table(&surface, kind, in_metres(b.axis), up)),
+                };
+                note_rays(run, "the skin", &stand);
+                out.rigid.push(RigidSolid { solid, surface, stand, motion: None });
+            }
         }
     }
     for mesh in &run.project.bodies {
         let read = ply::read_mesh(&mesh.file.path)?;
         let topology = Topology::new(&read.mesh);
-        let solid = Solid::new(&read.mesh, &topology);
-        note_holes(run, &mesh.file.label, &solid);
-        let surface = solid.at(&read.mesh.position, unit, &settings);
-        let whole = |e: Ellipsoid| e.around(&surface.position);
-        let ellipsoid = match mesh.shape {
-            MeshShape::Field => None,
-            MeshShape::Ellipsoid => Ellipsoid::fit(&surface.position).map(whole),
+        let solid = closed(run, &mesh.file.label, &read.mesh, &topology);
+        let surface = Surface::new(&solid, &metres(&read.mesh.position, unit));
+        let stand = match mesh.kind {
+            BodyKind::Field => Stand::Field(surface.field(&solid, &settings, None)),
+            BodyKind::Ellipsoid => Stand::Ellipsoid(ellipsoid(&surface).around(&surface.position)),
+            kind => Stand::Table(table(&surface, kind, in_metres(mesh.axis), up)),
         };
-        out.rigid.push(RigidSolid { solid, surface, ellipsoid, motion: Some(mesh.motion.clone()) });
+        note_rays(run, &mesh.file.label, &stand);
+        out.rigid.push(RigidSolid { solid, surface, stand, motion: Some(mesh.motion.clone()) });
     }
     let out = Rc::new(out);
-    run.colliders = Some(out.clone());
+    run.colliders = Some((layer, out.clone()));
     Ok(out)
 }
 
-fn note_holes(run: &mut Runner<'_>, name: &str, solid: &Solid) {
-    if solid.closed.open_edges > 0 {
-        let left = solid.closed.topology.counts.open_edges;
-        let text =
-            format!("{name}: {} open edges are closed for collisions, {left} stay open", solid.closed.open_edges);
+/// A mesh without a single finite vertex is a point at the origin.
+fn ellipsoid(surface: &Surface) -> Ellipsoid {
+    let nothing = Ellipsoid { placement: Rigid::default(), semi_axes: [0.0; 3] };
+    Ellipsoid::fit(&surface.position).unwrap_or(nothing)
+}
+
+/// A mesh with its holes closed.
+fn closed(run: &mut Runner<'_>, name: &str, mesh: &Mesh, topology: &Topology) -> Closed {
+    let solid = Closed::new(mesh, topology);
+    if solid.open_edges > 0 {
+        let left = solid.topology.counts.open_edges;
+        warn(run, format!("{name}: {} open edges are closed for collisions, {left} stay open", solid.open_edges));
+    }
+    solid
+}
+
+fn note_rays(run: &mut Runner<'_>, name: &str, stand: &Stand) {
+    if let Stand::Table(table) = stand
+        && table.missed > 0
+    {
+        let all = TABLE[0] * TABLE[1];
+        warn(run, format!("{name}: {} of {all} samples of its radius met no surface and are 0", table.missed));
+    }
+}
+
+/// Once a run, though layers come here one by one.
+fn warn(run: &mut Runner<'_>, text: String) {
+    if !run.warnings.contains(&text) {
         run.warnings.push(text);
     }
 }
 
+impl Anchor {
+    /// Vertices within `region`, or all where it has fewer than three.
+    fn new(rest: &[[f64; 3]], region: Option<Bounds>) -> Self {
+        let within = |p: &[f64; 3]| region.is_none_or(|(low, high)| (0..3).all(|i| low[i] <= p[i] && p[i] <= high[i]));
+        let mut vertex: Vec<usize> = (0..rest.len()).filter(|v| within(&rest[*v])).collect();
+        if vertex.len() < 3 {
+            vertex = (0..rest.len()).collect();
+        }
+        let rest: Vec<[f64; 3]> = vertex.iter().map(|v| rest[*v]).collect();
+        let middle = rest.iter().fold(Vec3::zeros(), |s, p| s + Vec3::from(*p)) / rest.len().max(1) as f64;
+        Anchor { vertex, rest, middle }
+    }
+}
+
 impl Colliders {
-    /// The deforming skin at a frame; `None` if it doesn't deform.
-    pub(super) fn end(&self, position: Option<&[[f64; 3]]>, unit: f64) -> Option<Rc<End>> {
+    /// The rigid part of the way from the rest pose to a skin with its vertices at `position` (scene units).
+    pub(super) fn placement(&self, position: Option<&[[f64; 3]]>, unit: f64) -> Rigid {
+        let Some((anchor, position)) = self.anchor.as_ref().zip(position) else { return Rigid::default() };
+        let now: Vec<[f64; 3]> = anchor.vertex.iter().map(|v| position[*v].map(|x| x * unit)).collect();
+        rigid_fit(&anchor.rest, &now).motion
+    }
+
+    /// Between two such placements: the middle of what was fitted goes straight, the rotation along the shorter arc.
+    pub(super) fn between(&self, [a, b]: &[Rigid; 2], f: f64) -> Rigid {
+        let middle = self.anchor.as_ref().map_or(Vec3::zeros(), |a| a.middle);
+        let dot: f64 = (0..4).map(|i| a.rotation[i] * b.rotation[i]).sum();
+        let q: [f64; 4] = std::array::from_fn(|i| (1.0 - f) * a.rotation[i] + f.copysign(dot) * b.rotation[i]);
+        let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let turn = Rigid { rotation: q.map(|x| x / norm), translation: [0.0; 3] };
+        let at = a.apply(middle) * (1.0 - f) + b.apply(middle) * f;
+        Rigid { translation: (at - turn.apply(middle)).into(), ..turn }
+    }
+
+    /// The deforming skin at a frame in the coordinates of its rigid part, `at`; `None` if it doesn't deform.
+    pub(super) fn end(
+        &self,
+        position: Option<&[[f64; 3]]>,
+        unit: f64,
+        at: &Rigid,
+        region: Option<Bounds>,
+    ) -> Option<Rc<End>> {
         let (skin, position) = self.skin.as_ref().zip(position)?;
-        Some(Rc::new(End { surface: skin.at(position, unit, &self.settings) }))
+        let local: Vec<[f64; 3]> = position.iter().map(|p| at.invert(Vec3::from(*p) * unit).into()).collect();
+        let surface = Surface::new(skin, &local);
+        let field = surface.field(skin, &self.settings, region);
+        Some(Rc::new(End { surface, field }))
     }
 
     /// The deforming skin over a span of `seconds` between two frames.
     pub(super) fn moving(&self, ends: [Rc<End>; 2], seconds: f64) -> Option<Moving> {
-        let triangle = &self.skin.as_ref()?.closed.mesh.triangle;
-        let [a, b] = [&ends[0].surface, &ends[1].surface];
+        let triangle = &self.skin.as_ref()?.mesh.triangle;
+        let [a, b] = [&ends[0], &ends[1]];
         let rate = |(p, q): (&[f64; 3], &[f64; 3])| std::array::from_fn(|x| (q[x] - p[x]) / seconds);
-        let velocity: Vec<[f64; 3]> = a.position.iter().zip(&b.position).map(rate).collect();
+        let velocity: Vec<[f64; 3]> = a.surface.position.iter().zip(&b.surface.position).map(rate).collect();
         let flow = [a.field.flow(triangle, &velocity), b.field.flow(triangle, &velocity)];
         Some(Moving { seconds, ends, flow, velocity })
     }
@@ -144,7 +262,7 @@ impl Colliders {
         own.map(|m| Box::new(move |f: f64| motion(m, f)) as Box<dyn Fn(f64) -> Rigid + Sync>).collect()
     }
 
-    /// Everything over a span: `skin` is the motion of a skin that moves as a whole, `own` those of other solids.
+    /// Everything over a span: `skin` is the motion of the skin or of its rigid part, `own` those of other solids.
     pub(super) fn body<'a>(
         &'a self,
         skin: &'a (dyn Fn(f64) -> Rigid + Sync),
@@ -156,24 +274,23 @@ impl Colliders {
         let mut own = own.iter();
         for r in &self.rigid {
             let motion = if r.motion.is_some() { &**own.next().expect("a motion each") } else { skin };
-            let shape = r.ellipsoid.as_ref().map_or(Shape::Field(&r.surface.field), Shape::Ellipsoid);
-            let triangle = &r.solid.closed.mesh.triangle;
-            let exact = r.ellipsoid.is_none().then_some(Exact { bvh: &r.surface.bvh, triangle, velocity: None });
+            let shape = match &r.stand {
+                Stand::Field(field) => Shape::Field(field),
+                Stand::Table(table) => Shape::Table(table),
+                Stand::Ellipsoid(ellipsoid) => Shape::Ellipsoid(ellipsoid),
+            };
+            let exact = Some(Exact { bvh: &r.surface.bvh, triangle: &r.solid.mesh.triangle, velocity: None });
             parts.push(Part { motion, shape, exact });
         }
         if let Some((m, solid)) = moving.zip(self.skin.as_ref()) {
-            let field = [&m.ends[0].surface.field, &m.ends[1].surface.field];
+            let field = [&m.ends[0].field, &m.ends[1].field];
             let shape = Shape::Deforming(Deforming { field, flow: [&m.flow[0], &m.flow[1]], seconds: m.seconds });
-            let triangle = &solid.closed.mesh.triangle;
-            let exact = Some(Exact { bvh: &m.ends[1].surface.bvh, triangle, velocity: Some(&m.velocity) });
-            parts.push(Part { motion: &still, shape, exact });
+            let bvh = &m.ends[1].surface.bvh;
+            let exact = Some(Exact { bvh, triangle: &solid.mesh.triangle, velocity: Some(&m.velocity) });
+            parts.push(Part { motion: skin, shape, exact });
         }
         Body { parts, seconds }
     }
-}
-
-fn still(_: f64) -> Rigid {
-    Rigid::default()
 }
 
 /// True if the skin of a shot deforms.

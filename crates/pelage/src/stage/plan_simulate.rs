@@ -3,7 +3,7 @@
 use super::Stage;
 use super::plan::{Plan, Reader, Step, What, version};
 use crate::cache::{Key, Recipe};
-use crate::config::{Keyed, Target};
+use crate::config::{BodyKind, Keyed, Target};
 use crate::project::{Project, SkinAt, SkinMotion};
 use crate::timeline::{STEP, Timeline};
 
@@ -107,7 +107,7 @@ impl Reader<'_> {
         let frames = (from..=to).map(|f| f as f64);
         let r = r.param("gravity", values(&gravity, frames), self.in_shot("simulate.gravity"));
         let Some(wind) = &shot.simulate.wind else { return r };
-        let all: Vec<pelage_sim::Wind> = (from..to).map(|f| wind.at(f as f64 + 0.5, shot.shot.fps)).collect();
+        let all: Vec<pelage_sim::Wind> = (from..=to).map(|f| wind.at(f as f64, shot.shot.fps)).collect();
         let velocity = once(all.iter().map(|w| format!("{:?}", w.velocity)));
         let mut r = r.param("wind.velocity", velocity, self.in_shot("simulate.wind.velocity"));
         type Of = fn(&pelage_sim::Wind) -> f64;
@@ -136,6 +136,9 @@ impl Reader<'_> {
         let in_shot = |key: &str| self.in_shot(&format!("simulate.body.{key}"));
         let skin = b.skin && self.project.rest.is_some();
         let mut r = r.param("body.skin", skin, in_shot("skin"));
+        if skin {
+            r = self.axis(r.param("body.kind", b.kind.name(), in_shot("kind")), "body", b.kind, b.axis);
+        }
         if skin || !self.project.bodies.is_empty() {
             for (key, x) in [("voxel", b.voxel), ("outside", b.outside), ("inside", b.inside)] {
                 r = r.param(&format!("body.{key}"), x, in_shot(key));
@@ -144,7 +147,8 @@ impl Reader<'_> {
         for (i, m) in self.project.bodies.iter().enumerate() {
             let name = format!("mesh[{i}]");
             r = r.file(&name, &m.file.hash, m.file.label.clone());
-            r = r.param(&format!("{name}.shape"), format!("{:?}", m.shape), in_shot(&format!("{name}.shape")));
+            r = r.param(&format!("{name}.kind"), m.kind.name(), in_shot(&format!("{name}.kind")));
+            r = self.axis(r, &name, m.kind, m.axis);
             for (frame, motion) in m.motion.iter().flat_map(|motion| (from..=to).map(move |f| (f, motion))) {
                 let samples = between(motion, frame).filter(|_| frame > from).unwrap_or_default();
                 let value = format!("{:?} {samples}", motion.at(frame as f64));
@@ -152,6 +156,16 @@ impl Reader<'_> {
             }
         }
         r
+    }
+
+    /// Where a table stands: by its axis, or by the mesh's bounds along the scene's up.
+    fn axis(&self, r: Recipe, name: &str, kind: BodyKind, axis: Option<[[f64; 3]; 2]>) -> Recipe {
+        if !kind.is_table() {
+            return r;
+        }
+        let up = self.project.shot.value.shot.up;
+        let value = axis.map_or_else(|| format!("along {up:?}"), |a| format!("{a:?}"));
+        r.param(&format!("{name}.axis"), value, self.in_shot(&format!("simulate.body ({name}.axis)")))
     }
 
     /// What the way from the rest pose into the motion reads of the motion, where its frames do not say it.

@@ -62,7 +62,7 @@ pub struct Runner<'a> {
     pub(super) placed: Option<pelage_groom::control::ControlHairs>,
     pub(super) control: Option<Rc<pelage_groom::control::ControlHairs>>,
     pub(super) curves: Option<Rc<super::curves::CurveHair>>,
-    pub(super) colliders: Option<Rc<super::body::Colliders>>,
+    pub(super) colliders: Option<(usize, Rc<super::body::Colliders>)>,
     pub(super) running: Option<super::simulate::Running>,
     /// Frames that this run simulated (true), or took over from a run that was killed or ended earlier.
     simulated: BTreeMap<i64, bool>,

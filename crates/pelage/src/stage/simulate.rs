@@ -1,7 +1,8 @@
 //! Simulate: hair in motion, one stretch of frames after another, each from the checkpoint at the end of the one before.
 
+use super::body::{self, Colliders};
 use super::run::{Counts, Runner};
-use super::{What, body, curves, groom, instance, interpolate};
+use super::{What, curves, groom, instance, interpolate};
 use crate::Error;
 use crate::cache::LongStep;
 use crate::config::{StrandModel, Target};
@@ -11,8 +12,9 @@ use crate::timeline::Timeline;
 use pelage_geom::ride::{Ride, ease_positions, rides};
 use pelage_geom::{Offsets, Pose, SurfacePoint, Vec3};
 use pelage_groom::control;
-use pelage_sim::{Hairs, Model, Rigid, Root, Settings, SimError, Simulation, Span, SpanReport, Started};
+use pelage_sim::{Bounds, Hairs, Model, Rigid, Root, Settings, SimError, Simulation, Span, SpanReport, Started};
 use rayon::prelude::*;
+use std::rc::Rc;
 use std::time::Instant;
 
 /// Checkpoints within a stretch take at most this share of the time: a run that is killed loses about as little as that
@@ -24,6 +26,13 @@ const NAMED: usize = 8;
 
 /// How far roots may be from their rest pose where the simulation starts, relative to the hair's size; a turn in radians squared.
 const AT_REST: f64 = 1e-6;
+
+/// Room around the roots that fields cover, in lengths of the longest hair: hair stretches by a hundredth or so, and roots
+/// of a deforming skin move apart between frames. More makes fields for nothing.
+const REACH: f64 = 1.1;
+
+/// And metres more: what hair keeps from the body, and how far ahead contacts are looked for.
+const MARGIN: f64 = 0.02;
 
 /// Count of strands at rest: what the stage skips.
 pub(super) const SLEEPING: &str = "sleeping_strands";
@@ -342,14 +351,49 @@ fn bounds(points: &[[f64; 3]]) -> (Vec3, Vec3) {
     points.iter().fold(start, |(low, high), p| (low.inf(&Vec3::from(*p)), high.sup(&Vec3::from(*p))))
 }
 
-/// Roots in metres, each turned the shorter way from where it was.
-fn roots(rides: &[Ride], before: Option<&[Root]>, unit: f64) -> Vec<Root> {
-    let root = |(h, r): (usize, &Ride)| {
-        let same = before.is_none_or(|b| (0..4).map(|x| b[h].rotation[x] * r.rotation[x]).sum::<f64>() >= 0.0);
-        let rotation = if same { r.rotation } else { r.rotation.map(|x| -x) };
-        Root { position: r.position.map(|x| x * unit), rotation }
+/// The skin and the roots on it at a frame, as hair collides with and hangs on it.
+struct Moment {
+    /// Where the coordinates of the roots are: the rigid part of a deforming skin's motion.
+    placement: Rigid,
+    root: Vec<Root>,
+    end: Option<Rc<body::End>>,
+}
+
+fn moment(
+    run: &mut Runner<'_>,
+    timeline: &Timeline<'_>,
+    source: &Source,
+    colliders: &Colliders,
+    frame: i64,
+) -> Result<Moment, Error> {
+    let unit = run.project.shot.value.shot.meters_per_unit;
+    let position = skin_position(run, timeline, frame)?;
+    let rides = root_rides(run, source, position.as_deref())?;
+    let placement = colliders.placement(position.as_deref(), unit);
+    let turn = placement.quaternion().inverse();
+    let root = |r: &Ride| {
+        let q = turn * Rigid { rotation: r.rotation, translation: [0.0; 3] }.quaternion();
+        Root { position: placement.invert(Vec3::from(r.position) * unit).into(), rotation: [q.i, q.j, q.k, q.w] }
     };
-    rides.par_iter().enumerate().map(root).collect()
+    let root: Vec<Root> = rides.par_iter().map(root).collect();
+    let region = source.region(root.iter().map(|r| r.position));
+    let end = colliders.end(position.as_deref(), unit, &placement, region);
+    Ok(Moment { placement, root, end })
+}
+
+impl Source {
+    /// Where hair can come that hangs on these roots (metres); `None` without roots.
+    fn region(&self, root: impl Iterator<Item = [f64; 3]>) -> Option<Bounds> {
+        let length = |h: usize| {
+            let hair = &self.position[self.offsets.range(h)];
+            hair.windows(2).map(|p| (Vec3::from(p[1]) - Vec3::from(p[0])).norm()).sum::<f64>()
+        };
+        let longest = (0..self.id.len()).map(length).fold(0.0, f64::max);
+        let finite: Vec<[f64; 3]> = root.filter(|p| p.iter().all(|x| x.is_finite())).collect();
+        let (low, high) = bounds(&finite);
+        let reach = Vec3::repeat(longest * REACH + MARGIN);
+        (low.x <= high.x).then(|| ((low - reach).into(), (high + reach).into()))
+    }
 }
 
 /// Simulates up to frame `end` and keeps every frame of the shot and a checkpoint now and then.
@@ -369,11 +413,12 @@ fn advance(
     let (gravity, wind) = (shot.simulate.gravity.downward(shot.shot.up), shot.simulate.wind.as_ref());
     let (layer, arrival) = (&project.groom.value.layer[running.layer].name, timeline.arrival());
     let origin = run.origin()?;
-    let colliders = body::colliders(run, body::deforms(timeline))?;
+    let rest = running.source.anchor.iter().map(|p| p.map(|x| x * unit));
+    let region = running.source.region(rest);
+    let colliders = body::colliders(run, running.layer, body::deforms(timeline), region)?;
+    let colliders: &Colliders = &colliders;
     let seconds = 1.0 / shot.shot.fps;
-    let position = skin_position(run, timeline, running.frame)?;
-    let mut before = root_rides(run, &running.source, position.as_deref())?;
-    let mut end_before = colliders.end(position.as_deref(), unit);
+    let mut before = moment(run, timeline, &running.source, colliders, running.frame)?;
     let (mut saved, mut saving) = (Instant::now(), 0.0);
     // Without pre-roll the first frame is the start.
     if running.frame == timeline.first
@@ -386,14 +431,14 @@ fn advance(
     }
     while running.frame < end {
         let (from, frame) = (running.frame as f64, running.frame + 1);
-        let position = skin_position(run, timeline, frame)?;
-        let now = root_rides(run, &running.source, position.as_deref())?;
-        let end_now = colliders.end(position.as_deref(), unit);
-        let ends_of_skin = end_before.clone().zip(end_now.clone());
+        let now = moment(run, timeline, &running.source, colliders, frame)?;
+        let ends_of_skin = before.end.clone().zip(now.end.clone());
         let moving = ends_of_skin.and_then(|(a, b)| colliders.moving([a, b], seconds));
-        let begin = roots(&before, None, unit);
-        let ends = roots(&now, Some(&begin), unit);
-        let motion = |f: f64| timeline.rigid(arrival, from + f).map_or(Rigid::default(), |t| placement(&t, unit));
+        let placements = [before.placement, now.placement];
+        let motion = |f: f64| match timeline.rigid(arrival, from + f) {
+            Some(t) => placement(&t, unit),
+            None => colliders.between(&placements, f),
+        };
         let winds = wind.map(|w| [from, frame as f64].map(|f| w.at(f, shot.shot.fps)));
         let own = colliders.motions(from, unit);
         let body = colliders.body(&motion, &own, moving.as_ref(), seconds);
@@ -401,7 +446,7 @@ fn advance(
             seconds,
             time: timeline.seconds(from),
             motion: &motion,
-            roots: [&begin, &ends],
+            roots: [&before.root, &now.root],
             tips: None,
             body: &body,
             gravity: [gravity.at(from), gravity.at(frame as f64)],
@@ -420,7 +465,7 @@ fn advance(
             checkpoint(running, step).map_err(disk())?;
             (saved, saving) = (Instant::now(), clock.elapsed().as_secs_f64());
         }
-        (before, end_before) = (now, end_now);
+        before = now;
     }
     Ok(())
 }
