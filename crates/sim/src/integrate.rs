@@ -166,6 +166,7 @@ pub struct Interval {
 }
 
 /// Takes a step with some lanes; halves it for those that need it.
+#[allow(clippy::too_many_arguments)]
 pub fn advance<A: Around>(
     g: &mut Group,
     around: &A,

@@ -2,6 +2,9 @@
 //!
 //! SI units throughout: metres, seconds, kilograms. Positions are in the world, axes as in the scene.
 
+// Loops run over nodes, lanes and columns of several arrays at once: an index reads better there.
+#![allow(clippy::needless_range_loop)]
+
 pub mod band;
 pub mod body;
 pub mod contact;

@@ -95,7 +95,7 @@ fn collide(
             let i = i as usize;
             let keep = g.keep.most[i].0[l];
             let p = Vec3::new(x[i][0].0[l], x[i][1].0[l], x[i][2].0[l]);
-            if !contact::is_free(g, i, l) || !(body.distance_bound(p) < keep) {
+            if !contact::is_free(g, i, l) || body.distance_bound(p) >= keep {
                 continue;
             }
             let hit = body.sample(p);

@@ -270,7 +270,6 @@ fn lanes_and_threads_change_no_bit() {
 }
 
 #[test]
-#[ignore = "strands feel what their group is padded with"]
 fn order_and_company_change_no_bit() {
     let hairs = assorted(21);
     for model in MODELS {
@@ -313,7 +312,6 @@ fn a_saved_state_goes_on_as_if_nothing_happened() {
 }
 
 #[test]
-#[ignore = "the test of stability loses its differences in rounding far away"]
 fn far_from_the_origin_hair_moves_as_near_it() {
     let hairs = assorted(8);
     for model in MODELS {
@@ -343,7 +341,6 @@ fn far_from_the_origin_hair_moves_as_near_it() {
 }
 
 #[test]
-#[ignore = "strands feel what their group is padded with"]
 fn a_mirrored_groom_moves_mirrored() {
     let hairs = assorted(8);
     let mirror = |p: [f64; 3]| [-p[0], p[1], p[2]];
@@ -378,7 +375,6 @@ fn a_mirrored_groom_moves_mirrored() {
 }
 
 #[test]
-#[ignore = "strands feel what their group is padded with"]
 fn hair_turned_as_a_whole_moves_turned() {
     // Gravity turned along: nothing prefers an axis.
     let turn = turned(Vec3::new(0.3, -0.5, 0.7), 1.1).quaternion();

@@ -147,7 +147,9 @@ pub fn many() {
             let start = Instant::now();
             let mut shot = Shot::new(&hairs, &Settings::default(), GRAVITY);
             println!("# {count} hairs x 50 segments, body {solid}: prepared in {:.2} s", start.elapsed().as_secs_f64());
-            println!("frame,seconds,processor_seconds,steps,solves_per_step,subdivided,ns_per_node_and_step,held,peak_MB");
+            println!(
+                "frame,seconds,processor_seconds,steps,solves_per_step,subdivided,ns_per_node_and_step,held,peak_MB"
+            );
             for frame in 0..frames {
                 let (start, cpu) = (Instant::now(), processor());
                 advance(&mut shot, frame, solid.then_some(&field));

@@ -326,6 +326,7 @@ impl Iteration {
             contact: None,
             friction: 0.0,
             refresh: false,
+            solved: false,
             air: None,
             active: Pack::splat(1.0),
         };

@@ -4,9 +4,6 @@
 //! spring joins a particle with one of the three before it, every altitude spring acts on four particles in a row, so a
 //! strand's matrix has a half-bandwidth of three particles.
 
-// Loops run over particles: an index reaches neighbours as well.
-#![allow(clippy::needless_range_loop)]
-
 pub mod calibrate;
 pub mod kernel;
 pub mod layout;
