@@ -345,3 +345,24 @@ fn deforming_skins_and_gusts_give_the_same_bytes_from_any_checkpoint() {
     fresh.report(&[]);
     assert!(shot.outputs() == fresh.outputs());
 }
+
+#[test]
+fn tables_and_ellipsoids_keep_hair_out_too() {
+    let shot = simulated_shot(COMMAND, 4);
+    shot.edit(SHOT, "segments = 8", "segments = 8\nsag_free = false");
+    shot.edit(GROOM, "name = \"over\"", "name = \"over\"\nmaterial = { young_gpa = 0.01 }");
+    shot.edit(GROOM, "name = \"under\"", "name = \"under\"\nmaterial = { young_gpa = 0.01 }");
+    shot.edit(SHOT, "[export]", "[simulate.body]\nkind = \"cylinder\"\n\n[export]");
+    let slide: String =
+        (0..=4).map(|f| format!("{},{},0,0,0,0,0,1\n", f64::from(f) / 24.0, 0.002 * f64::from(f))).collect();
+    shot.write("grooms/ball.csv", format!("time_s,tx,ty,tz,qx,qy,qz,qw\n{slide}"));
+    for kind in ["cylinder", "sphere", "ellipsoid"] {
+        if kind != "cylinder" {
+            let before = if kind == "sphere" { "cylinder" } else { "sphere" };
+            shot.edit(SHOT, &format!("kind = \"{before}\""), &format!("kind = \"{kind}\""));
+        }
+        shot.report(&[]);
+        let inside = deepest(&shot, 4.0, 0.6);
+        assert!(inside < 0.05, "{kind}: hair is {inside} cm inside");
+    }
+}
