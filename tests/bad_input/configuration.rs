@@ -177,7 +177,6 @@ fn values_of_the_simulation() {
         ("wind = { velocity = [1, 0, 0], gust = -200 }", "simulate.wind.gust|out of range"),
         ("wind = { velocity = [1, 0, 0], turbulence_size = 0 }", "simulate.wind.turbulence_size|out of range"),
         ("body = { voxel = 0 }", "simulate.body.voxel|out of range|millimetres"),
-        ("model = \"springs\"", "simulate.model|not simulated in a shot yet|help:"),
         ("body = { kind = \"ball\" }", "unknown variant `ball`"),
         ("body = { axis = [[0, 0, 0], [0, 0, 0]] }", "simulate.body.axis|has no direction|help:"),
         ("body = { axis = [[0, 0, 0], [0, 1]] }", "line|array of 3 values"),

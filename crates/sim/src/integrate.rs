@@ -27,8 +27,9 @@ const WEIGHT: f64 = 0.353_553_390_593_273_8;
 /// What the last stage of TR-BDF2 takes from the first stage's movement: (1 - c)^2 / (c (2 - c)), c = 2 - sqrt 2.
 const TURN_CARRIED: f64 = 0.207_106_781_186_547_5;
 
-/// Most halvings of a step. Each doubles the work of that strand only.
-pub const DEEPEST: u8 = 6;
+/// Steps are halved until they are shorter than this, seconds: six times from a usual one. Each halving doubles the work
+/// of that strand only.
+const SHORTEST_STEP: f64 = 1.6e-4;
 
 /// A step of the deepest level whose iterations still turn an edge by this, radians, has diverged: the strand is held.
 const LOOSE: f64 = 0.1;
@@ -177,6 +178,7 @@ pub fn advance<A: Around>(
     work: &mut Work,
     done: &mut Done,
 ) {
+    let last = at.length * at.span <= SHORTEST_STEP;
     let wanted: [bool; LANES] = std::array::from_fn(|l| lanes[l] && !done.failed[l]);
     let mut deeper: [bool; LANES] = std::array::from_fn(|l| wanted[l] && g.level[l] > depth);
     let now: [bool; LANES] = std::array::from_fn(|l| wanted[l] && !deeper[l]);
@@ -188,7 +190,7 @@ pub fn advance<A: Around>(
             let finite = seen.finite.0[l] == 0.0;
             let calm = converged[l] && finite && seen.turn.0[l] <= method.largest_turn * method.largest_turn;
             let settled = converged[l] || work.left.0[l] < LOOSE;
-            if now[l] && (calm || (depth == DEEPEST && finite && settled)) {
+            if now[l] && (calm || (last && finite && settled)) {
                 done.deepest[l] = done.deepest[l].max(depth);
                 done.strain[l] = seen.strain.0[l];
                 if seen.strain.0[l] > method.strain_limit && g.springs.is_none() {
@@ -206,7 +208,7 @@ pub fn advance<A: Around>(
             }
             g.revert(l, &saved.motion, &saved.altitude);
             if now[l] {
-                if depth == DEEPEST {
+                if last {
                     done.failed[l] = true;
                 } else {
                     g.level[l] = depth + 1;

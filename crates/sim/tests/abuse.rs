@@ -117,7 +117,9 @@ fn violent_skins(calms: bool) {
                     let t = shot.time;
                     shot.go(seconds, &move |f| skin(t + f * seconds), &Body::default(), None);
                     check(&shot, &hairs, &what);
-                    assert!(shot.last.held.is_empty(), "{what}: held {:?}", shot.last.held);
+                    // Thrown at 5 km/s in a single step, a strand may be held, and said so.
+                    let thrown = name == "ten metres at once" && seconds < 0.01;
+                    assert!(thrown || shot.last.held.is_empty(), "{what}: held {:?}", shot.last.held);
                 }
                 let end = skin(shot.time);
                 for _ in 0..if calms { 24 } else { 1 } {

@@ -310,7 +310,9 @@ fn a_twisted_ring_leaves_its_plane_where_michell_says() {
     for model in MODELS {
         for (factor, buckles) in [(0.95, false), (1.05, true)] {
             let m = rod(1.0);
-            let settings = Settings { tip: End::Clamped, ..plain(model, Material { damping: 2e-3, ..m }) };
+            // The tangent leaves out the twisting moment's second derivative: only iterations to the end find the threshold.
+            let settings =
+                Settings { tip: End::Clamped, tolerance: 1e-9, ..plain(model, Material { damping: 2e-3, ..m }) };
             // A straight rod bent to a ring: every inner hinge by 2 pi / n, the clamps' by half of that.
             let mut shot = Shot::new(&[straight(n, Vec3::x())], &settings, [0.0; 3]);
             let bent = |a: f64| {

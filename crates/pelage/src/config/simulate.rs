@@ -473,10 +473,6 @@ impl Document<ShotFile> {
         }
         let up = self.value.shot.up;
         self.keys("simulate.gravity", &s.gravity.downward(up), 1e6, "9.81 is the earth's, in m/s2")?;
-        // They are there strand by strand (`pelage_sim::springs`), but layers of hair step as rods.
-        if s.model != StrandModel::Rod {
-            return Err(self.error("simulate.model", "is not simulated in a shot yet", "leave it out, or say \"rod\""));
-        }
         self.check_body()?;
         let Some(wind) = &s.wind else { return Ok(()) };
         let three = |k: &Keyed<f64>| Keyed(k.0.iter().map(|k| Key { frame: k.frame, value: [k.value; 3] }).collect());
