@@ -89,7 +89,6 @@ fn violent_skins_in_steps_of_any_length() {
 }
 
 #[test]
-#[ignore = "a strand whose shortest steps do not converge spins for ever"]
 fn hair_calms_down_after_violent_skins() {
     violent_skins(true);
 }
@@ -198,7 +197,6 @@ fn degenerate_hairs_beside_good_ones() {
 }
 
 #[test]
-#[ignore = "a strand whose shortest steps do not converge spins for ever"]
 fn degenerate_hairs_calm_down() {
     degenerate_hairs(true);
 }
@@ -413,7 +411,7 @@ fn nothing_to_do_and_stopping() {
 static EMPTY: Body<'static> = Body { parts: Vec::new(), seconds: FRAME };
 
 #[test]
-#[ignore = "a strand whose shortest steps do not converge spins for ever"]
+#[ignore = "a strand folded flat onto itself is held, and does not open again"]
 fn soft_hair_crushed_together_spreads_again() {
     // Straight hair in a heap: every segment folded back, then let go.
     let n = 16;
