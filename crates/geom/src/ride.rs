@@ -153,7 +153,8 @@ mod tests {
             for (ride, a) in found.iter().zip(&anchor) {
                 let dot: f64 = (0..4).map(|x| ride.rotation[x] * t.rotation[x]).sum();
                 assert!(dot.abs() > 1.0 - 1e-11 && ride.rotation[3] >= 0.0, "{ride:?} {t:?}");
-                assert!((Vec3::from(ride.position) - t.apply(Vec3::from(*a))).norm() < 1e-12);
+                // Frames come from single-precision normals and tangents.
+                assert!((Vec3::from(ride.position) - t.apply(Vec3::from(*a))).norm() < 1e-6);
             }
             let offsets = Offsets::uniform(root.len(), 1);
             let mut points: Vec<[f32; 3]> = anchor.iter().map(|a| a.map(|x| x as f32)).collect();
