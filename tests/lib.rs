@@ -199,6 +199,13 @@ pub fn ascii_ply(mesh: &pelage_geom::Mesh) -> String {
     )
 }
 
+/// The ball of the small shots sheared by an amount, as a PLY.
+pub fn deformed(amount: f64) -> String {
+    let mut mesh = pelage_geom::shapes::cube_sphere(8, 5.0);
+    mesh.position.iter_mut().for_each(|p| p[0] += 0.02 * amount * p[1]);
+    ascii_ply(&mesh)
+}
+
 /// A greyscale 8-bit PNG, rows from the top.
 pub fn grey_png(width: u32, height: u32, value: impl Fn(u32, u32) -> u8) -> Vec<u8> {
     let mut raw = Vec::new();

@@ -1,7 +1,7 @@
 //! What runs again when something changes, row by row of `docs/cache.md`, with the reason printed. After every edit the
 //! results must also be those of a run that starts from nothing.
 
-use pelage_tests::{ExportedHair, ShotFolder, ascii_ply, exported_hairs, grey_png, small_shot};
+use pelage_tests::{ExportedHair, ShotFolder, ascii_ply, deformed, exported_hairs, grey_png, small_shot};
 use std::collections::{BTreeMap, BTreeSet};
 
 const COMMAND: &str = env!("CARGO_BIN_EXE_pelage-under-test");
@@ -26,12 +26,6 @@ fn deforming() -> ShotFolder {
     shot.edit(SHOT, "motion = \"grooms/ball.csv\"", "frames = \"anim/ball.####.ply\"");
     shot.report(&[]);
     shot
-}
-
-fn deformed(amount: f64) -> String {
-    let mut mesh = pelage_geom::shapes::cube_sphere(8, 5.0);
-    mesh.position.iter_mut().for_each(|p| p[0] += 0.02 * amount * p[1]);
-    ascii_ply(&mesh)
 }
 
 /// Step names; `interpolate/x/*` stands for the rest pose and frames 1 to 3, `instance/*/x` for what follows the roots.

@@ -1,6 +1,6 @@
 //! Simulated hair end to end: what runs again, from which checkpoint, and that frames, pre-roll and targets fit together.
 
-use pelage_tests::{ExportedHair, ShotFolder, ascii_ply, exported_hairs, grey_png, simulated_shot};
+use pelage_tests::{ExportedHair, ShotFolder, deformed, exported_hairs, grey_png, simulated_shot};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,12 +14,6 @@ fn finished(frames: u32) -> ShotFolder {
     let shot = simulated_shot(COMMAND, frames);
     shot.report(&[]);
     shot
-}
-
-fn deformed(amount: f64) -> String {
-    let mut mesh = pelage_geom::shapes::cube_sphere(8, 5.0);
-    mesh.position.iter_mut().for_each(|p| p[0] += 0.02 * amount * p[1]);
-    ascii_ply(&mesh)
 }
 
 /// A skin in files, `first` to `last` of them there, in a shot of frames 1 to 6.

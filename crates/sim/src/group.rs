@@ -4,7 +4,7 @@ use crate::band::HELD;
 use crate::contact::Keep;
 use crate::lanes::{LANES, Pack};
 use crate::rod::Elastic;
-use crate::simulation::{End, Settings};
+use crate::settings::{End, Settings};
 use crate::springs::kernel::{self, NodeAltitude};
 use crate::springs::layout::Layout;
 use crate::springs::plain;
@@ -55,6 +55,15 @@ pub struct Springs {
     pub model: kernel::Group,
     /// Altitudes in use: state.
     pub altitude: Vec<NodeAltitude>,
+}
+
+/// A group's changing state.
+#[derive(Clone, Debug, Default)]
+pub struct Snapshot {
+    /// Where nodes are.
+    pub motion: Vec<Motion>,
+    /// Altitudes of springs.
+    altitude: Vec<NodeAltitude>,
 }
 
 /// What a held end carries, relative to its point at rest.
@@ -329,10 +338,25 @@ impl Group {
         }
     }
 
-    /// Copies a lane's state from another snapshot of the same group.
-    pub fn revert(&mut self, lane: usize, saved: &[Motion], altitudes: &[NodeAltitude]) {
+    /// A copy of the state.
+    pub fn snapshot(&self) -> Snapshot {
+        let mut saved = Snapshot::default();
+        self.save(&mut saved);
+        saved
+    }
+
+    /// A copy of the state into existing memory.
+    pub fn save(&self, to: &mut Snapshot) {
+        to.motion.clone_from(&self.motion);
+        if let Some(springs) = &self.springs {
+            to.altitude.clone_from(&springs.altitude);
+        }
+    }
+
+    /// Copies a lane's state from a snapshot of this group.
+    pub fn revert(&mut self, lane: usize, saved: &Snapshot) {
         if let Some(springs) = &mut self.springs {
-            for (to, from) in springs.altitude.iter_mut().zip(altitudes) {
+            for (to, from) in springs.altitude.iter_mut().zip(&saved.altitude) {
                 for c in 0..3 {
                     to.face[c].0[lane] = from.face[c].0[lane];
                 }
@@ -340,7 +364,7 @@ impl Group {
                 to.offset.0[lane] = from.offset.0[lane];
             }
         }
-        for (to, from) in self.motion.iter_mut().zip(saved) {
+        for (to, from) in self.motion.iter_mut().zip(&saved.motion) {
             for c in 0..3 {
                 to.x[c].0[lane] = from.x[c].0[lane];
                 to.v[c].0[lane] = from.v[c].0[lane];

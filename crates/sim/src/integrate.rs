@@ -9,20 +9,19 @@
 //! A strand whose stage does not converge, or that turns too far in a step, takes that step in two halves, and so on; it
 //! alone, so no hair changes another.
 
-use crate::band::{self, HELD, Panel, RING, Window};
+mod kernels;
+
+use crate::band::HELD;
 use crate::contact;
-use crate::group::{Group, mask};
-use crate::lanes::{self, Kernel, L3, LANES, Lanes, Pack, Width, load3, mul_add3, scale3, store3, sub3};
-use crate::rod::{self, Damping, Scratch, Watch};
-use crate::springs::kernel::{self, NodeAltitude};
-use crate::springs::paper::{FORGET, limit_strain as limit_springs};
-use crate::stage::{Air, Contact, Motion, Stage, open_node};
+use crate::group::{Group, Snapshot, mask};
+use crate::lanes::{self, LANES, Pack, Width};
+use crate::rod::{Damping, Scratch, Watch};
+use crate::springs::paper::FORGET;
+use crate::stage::{Air, Contact, Motion, Stage};
+use kernels::{Choose, Finish, Iterate, IterateSprings, LimitSprings, Look, Predict};
 
 /// The fraction of a step that each stage spans: 1 - 1 / sqrt 2.
 const GAMMA: f64 = 0.292_893_218_813_452_5;
-
-/// Weight of both earlier derivatives in the last stage of TR-BDF2: sqrt 2 / 4.
-const WEIGHT: f64 = 0.353_553_390_593_273_8;
 
 /// What the last stage of TR-BDF2 takes from the first stage's movement: (1 - c)^2 / (c (2 - c)), c = 2 - sqrt 2.
 const TURN_CARRIED: f64 = 0.207_106_781_186_547_5;
@@ -51,13 +50,6 @@ const FIRST_TURN: f64 = 0.05;
 
 /// Slowest convergence that is believed.
 const SLOWEST: f64 = 0.9;
-
-/// A group's state before a step.
-#[derive(Clone, Debug, Default)]
-struct Snapshot {
-    motion: Vec<Motion>,
-    altitude: Vec<NodeAltitude>,
-}
 
 /// Buffers of a thread.
 #[derive(Debug, Default)]
@@ -147,8 +139,6 @@ pub struct Done {
     pub deepest: [u8; LANES],
     /// Lanes that diverged.
     pub failed: [bool; LANES],
-    /// Steps after which a strand's strain was limited.
-    pub limited: u64,
     /// Largest strain at the end of a step, per lane.
     pub strain: [f64; LANES],
     /// Largest speed at the end, per lane.
@@ -197,7 +187,6 @@ pub fn advance<A: Around>(
                     limit_strain(g, l, method.strain_limit, at.length * at.span);
                     g.forget_acceleration(l);
                     done.strain[l] = method.strain_limit;
-                    done.limited += 1;
                 }
                 done.speed[l] = seen.speed.0[l].sqrt();
                 // Half the turn would have been fine with twice the step.
@@ -206,7 +195,7 @@ pub fn advance<A: Around>(
                 }
                 continue;
             }
-            g.revert(l, &saved.motion, &saved.altitude);
+            g.revert(l, &saved);
             if now[l] {
                 if last {
                     done.failed[l] = true;
@@ -258,10 +247,7 @@ fn save(g: &Group, work: &mut Work, depth: u8) -> Snapshot {
         work.saved.resize(depth as usize + 1, Snapshot::default());
     }
     let mut saved = std::mem::take(&mut work.saved[depth as usize]);
-    saved.motion.clone_from(&g.motion);
-    if let Some(springs) = &g.springs {
-        saved.altitude.clone_from(&springs.altitude);
-    }
+    g.save(&mut saved);
     saved
 }
 
@@ -286,14 +272,14 @@ fn step_each<A: Around>(
     }
     let mut converged = step(g, around, method, at, cold, true, &saved.motion, work, done);
     if warm.contains(&true) {
-        let kept = (g.motion.clone(), g.springs.as_ref().map_or(Vec::new(), |s| s.altitude.clone()));
+        let kept = g.snapshot();
         for l in (0..LANES).filter(|&l| !cold[l]) {
-            g.revert(l, &saved.motion, &saved.altitude);
+            g.revert(l, saved);
         }
         let others = step(g, around, method, at, warm, false, &saved.motion, work, done);
         for l in 0..LANES {
             if cold[l] {
-                g.revert(l, &kept.0, &kept.1);
+                g.revert(l, &kept);
             }
             converged[l] |= others[l];
         }
@@ -301,8 +287,8 @@ fn step_each<A: Around>(
     converged
 }
 
-#[allow(clippy::too_many_arguments)]
 /// Both stages; returns the lanes that converged.
+#[allow(clippy::too_many_arguments)]
 fn step<A: Around>(
     g: &mut Group,
     around: &A,
@@ -454,213 +440,6 @@ fn solve(
     }
     // Points that come and go at the body may swing around the tolerance: close is enough there.
     std::array::from_fn(|l| !active[l] || (touching[l] && last.0[l] < CONTACT_TOLERANCE))
-}
-
-/// One iteration of a rod.
-struct Iterate<'a, 'b, const D: usize, const ROWS: usize> {
-    g: &'a mut Group,
-    turned: &'a mut [Pack],
-    damping: Damping,
-    stage: Stage<'b>,
-    scratch: &'a mut Scratch<D, ROWS>,
-}
-
-impl<const D: usize, const ROWS: usize> Kernel for Iterate<'_, '_, D, ROWS> {
-    type Out = Pack;
-    #[inline(always)]
-    fn run<L: Lanes>(self) -> Pack {
-        let Iterate { g, turned, damping, mut stage, scratch } = self;
-        rod::solve::<L, D, ROWS>(&g.node, &g.elastic, &g.motion, turned, damping, &mut stage, scratch);
-        let largest = rod::apply::<L, D, ROWS>(&g.node, &mut g.motion, turned, &stage.active, scratch);
-        let mut out = Pack::default();
-        largest.store(&mut out);
-        out
-    }
-}
-
-/// One iteration of springs.
-struct IterateSprings<'a, 'b> {
-    g: &'a mut Group,
-    turned: &'a mut [Pack],
-    stage: Stage<'b>,
-    scratch: &'a mut Scratch<3, 12>,
-    x: &'a mut Vec<[Pack; 3]>,
-}
-
-impl Kernel for IterateSprings<'_, '_> {
-    type Out = Pack;
-    #[inline(always)]
-    fn run<L: Lanes>(self) -> Pack {
-        let IterateSprings { g, turned, mut stage, scratch, x } = self;
-        let n = g.node.len();
-        let springs = g.springs.as_ref().expect("a group of springs");
-        positions(&g.motion, x);
-        let rhs = &mut scratch.rhs[..n + 4];
-        for r in &mut rhs[n..] {
-            *r = [Pack::default(); 3];
-        }
-        let mut window: Window<L, 3, 12> = [Panel::zero(); RING];
-        for i in 0..n + 3 {
-            if i < n {
-                open_node(i, &g.node[i], &g.motion[i], &mut stage, &mut window, &mut rhs[i]);
-                kernel::add_node::<L, true>(i, &springs.model.model[i], &springs.altitude[i], x, &mut window, rhs);
-            }
-            if i >= 3 {
-                band::eliminate::<L, 3, 12>(i - 3, &mut window, &mut scratch.factor[i - 3], rhs);
-            }
-        }
-        for j in (0..n).rev() {
-            band::substitute::<L, 3, 12>(j, &scratch.factor[j], rhs);
-        }
-        let largest = rod::apply::<L, 3, 12>(&g.node, &mut g.motion, turned, &stage.active, scratch);
-        let mut out = Pack::default();
-        largest.store(&mut out);
-        out
-    }
-}
-
-fn positions(motion: &[Motion], x: &mut Vec<[Pack; 3]>) {
-    x.clear();
-    x.extend(motion.iter().map(|m| m.x));
-}
-
-/// Chooses the altitudes of a step.
-struct Choose<'a> {
-    g: &'a mut Group,
-    x: &'a mut Vec<[Pack; 3]>,
-    forget: f64,
-}
-
-impl Kernel for Choose<'_> {
-    type Out = ();
-    #[inline(always)]
-    fn run<L: Lanes>(self) {
-        let Choose { g, x, forget } = self;
-        positions(&g.motion, x);
-        let springs = g.springs.as_mut().expect("a group of springs");
-        for i in 3..x.len() {
-            let (candidates, altitude) = (&springs.model.candidates[i], &mut springs.altitude[i]);
-            kernel::choose_node::<L>(i, candidates, altitude, x, L::splat(forget));
-        }
-        for (m, x) in g.motion.iter_mut().zip(x.iter()) {
-            m.x = *x;
-        }
-    }
-}
-
-/// Strain limiting of springs, which act on more than the axis.
-struct LimitSprings<'a> {
-    g: &'a mut Group,
-    x: &'a mut Vec<[Pack; 3]>,
-    limit: f64,
-    dt: f64,
-}
-
-impl Kernel for LimitSprings<'_> {
-    type Out = ();
-    #[inline(always)]
-    fn run<L: Lanes>(self) {
-        let LimitSprings { g, x, limit, dt } = self;
-        positions(&g.motion, x);
-        let springs = g.springs.as_ref().expect("a group of springs");
-        limit_springs::<L>(&springs.model, x, limit);
-        for (m, x) in g.motion.iter_mut().zip(x.iter()) {
-            for c in 0..3 {
-                for l in 0..LANES {
-                    m.v[c].0[l] += (x[c].0[l] - m.x[c].0[l]) / dt;
-                }
-            }
-            m.x = *x;
-        }
-    }
-}
-
-/// Free flight and the first guess of a stage.
-struct Predict<'a> {
-    motion: &'a mut [Motion],
-    y: &'a mut [[Pack; 3]],
-    base: &'a mut [[Pack; 3]],
-    from: &'a mut [[Pack; 3]],
-    h: f64,
-    rest: f64,
-    gravity: [f64; 3],
-    second: bool,
-    cold: bool,
-    dt: f64,
-}
-
-impl Kernel for Predict<'_> {
-    type Out = ();
-    #[inline(always)]
-    fn run<L: Lanes>(self) {
-        let h = L::splat(self.h);
-        let inverse = L::splat(1.0 / self.h);
-        let rest = L::splat(self.rest);
-        let [x, y, z] = self.gravity;
-        let fall: L3<L> = [L::splat(x), L::splat(y), L::splat(z)];
-        for (i, m) in self.motion.iter_mut().enumerate() {
-            let x = load3::<L>(&m.x);
-            let (vn, an) = (load3::<L>(&m.v), load3::<L>(&m.a));
-            let w = L::splat(self.dt * WEIGHT);
-            let (base, from, a) = if !self.cold && self.second {
-                let (b1, f1) = (load3::<L>(&self.base[i]), load3::<L>(&self.from[i]));
-                let v1 = scale3(sub3(x, b1), inverse);
-                let a1 = scale3(sub3(v1, f1), inverse);
-                let xn = mul_add3(vn, -h, b1);
-                (mul_add3(lanes::add3(vn, v1), w, xn), mul_add3(lanes::add3(an, a1), w, vn), a1)
-            } else if !self.cold {
-                (mul_add3(vn, h, x), mul_add3(an, h, vn), an)
-            } else if self.second {
-                let start = load3::<L>(&self.base[i]);
-                let before = load3::<L>(&self.from[i]);
-                let v = scale3(sub3(x, start), inverse);
-                let a = scale3(sub3(v, before), inverse);
-                (mul_add3(v, rest, start), mul_add3(a, rest, before), a)
-            } else {
-                (x, vn, an)
-            };
-            store3(mul_add3(mul_add3(fall, h, from), h, base), &mut self.y[i]);
-            store3(mul_add3(mul_add3(a, h, from), h, base), &mut m.x);
-            store3(base, &mut self.base[i]);
-            store3(from, &mut self.from[i]);
-        }
-    }
-}
-
-/// Velocities and accelerations after the last stage.
-struct Finish<'a> {
-    motion: &'a mut [Motion],
-    base: &'a [[Pack; 3]],
-    from: &'a [[Pack; 3]],
-    h: f64,
-}
-
-impl Kernel for Finish<'_> {
-    type Out = ();
-    #[inline(always)]
-    fn run<L: Lanes>(self) {
-        let inverse = L::splat(1.0 / self.h);
-        for (i, m) in self.motion.iter_mut().enumerate() {
-            let v = scale3(sub3(load3::<L>(&m.x), load3(&self.base[i])), inverse);
-            store3(v, &mut m.v);
-            store3(scale3(sub3(v, load3(&self.from[i])), inverse), &mut m.a);
-        }
-    }
-}
-
-struct Look<'a> {
-    g: &'a Group,
-    before: &'a [Motion],
-}
-
-impl Kernel for Look<'_> {
-    type Out = Watch;
-    #[inline(always)]
-    fn run<L: Lanes>(self) -> Watch {
-        let mut out = Watch::default();
-        rod::watch::<L>(&self.g.node, &self.g.elastic, self.before, &self.g.motion, &mut out);
-        out
-    }
 }
 
 fn look(g: &Group, method: &Method, before: &[Motion]) -> Watch {

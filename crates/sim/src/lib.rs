@@ -10,10 +10,13 @@ pub mod body;
 pub mod contact;
 pub mod drag;
 pub mod group;
+mod hinge;
 pub mod integrate;
 pub mod lanes;
 pub mod nine_steps;
 pub mod rod;
+mod scene;
+pub mod settings;
 pub mod settle;
 pub mod simulation;
 pub mod springs;
@@ -24,9 +27,8 @@ pub use body::{
     Body, Bounds, Closed, Deforming, Ellipsoid, Exact, Field, FieldSettings, Flow, Hit, Instant, Motion, Part, Rigid,
     RigidFit, Shape, Table, rigid_fit,
 };
-pub use simulation::{
-    End, Hairs, Material, Model, Root, Settings, SimError, Simulation, Span, SpanReport, Started, StiffenedStrand,
-};
+pub use settings::{End, Material, Model, Settings};
+pub use simulation::{Hairs, Root, SimError, Simulation, Span, SpanReport, Started, StiffenedStrand};
 pub use wind::Wind;
 
 /// Three coordinates.

@@ -10,7 +10,7 @@ use crate::band::{self, Column, Panel, RING, Window};
 use crate::group::{Group, Section, Strand};
 use crate::lanes::{self, Kernel, LANES, Lanes, Pack, Width};
 use crate::rod::{self, Damping, Scratch};
-use crate::simulation::{End, Model, Settings};
+use crate::settings::{End, Model, Settings};
 use crate::springs::calibrate::{self, Calibration};
 use crate::springs::layout::{self, Layout};
 use crate::springs::plain::Model as Springs;
@@ -55,7 +55,7 @@ pub fn prepare(strands: &[Strand], settings: &Settings, gravity: [f64; 3]) -> (G
         return (prepare_springs(strands, settings, gravity, sag_free, &mut figures), figures);
     }
     let mut group = Group::pack(strands, settings);
-    let width = if settings.wide { Width::best() } else { Width::Plain };
+    let width = settings.width();
     let (weight, free) = weights(&group, gravity);
     let settle = |group: &mut Group| {
         lanes::run(width, Settle { group, weight: &weight, free: &free, sag_free });

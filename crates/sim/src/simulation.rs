@@ -1,15 +1,15 @@
 //! A layer of hair in motion: the constant model, the changing state, and the step over a span of time.
 
 use crate::contact::{self, Keep};
-use crate::drag;
 use crate::group::{Group, Strand};
-use crate::integrate::{self, Around, Done, Interval, Method, StageTime, Work};
-use crate::lanes::{LANES, Pack, Width};
+use crate::integrate::{self, Around, Done, Interval, Method, Work};
+use crate::lanes::{LANES, Pack};
 use crate::nine_steps;
 use crate::rod::{self, Damping};
+use crate::scene::{Scene, is_calm};
+use crate::settings::{Model, Settings};
 use crate::settle;
-use crate::stage::{self, Air, Contact};
-use crate::wind::Surface;
+use crate::stage;
 use crate::{Body, Motion, Rigid, Vec3, Wind};
 use pelage_geom::{Offsets, StrandId};
 use rayon::prelude::*;
@@ -24,128 +24,6 @@ pub struct Hairs<'a> {
     pub position: &'a [[f64; 3]],
     /// Names, one a hair.
     pub id: &'a [StrandId],
-}
-
-/// What hair is made of. SI units.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Material {
-    /// Diameter of the round section, metres.
-    pub diameter: f64,
-    /// Young's modulus, pascals.
-    pub young: f64,
-    /// Poisson's ratio.
-    pub poisson: f64,
-    /// Density, kilograms per cubic metre.
-    pub density: f64,
-    /// Relaxation time of bending and twisting, seconds: internal damping is this times stiffness.
-    pub damping: f64,
-    /// Artist's factor on bending stiffness.
-    pub bend_factor: f64,
-    /// Artist's factor on twisting stiffness.
-    pub twist_factor: f64,
-    /// Artist's factor on stretching stiffness.
-    pub stretch_factor: f64,
-    /// Artist's factor on air drag.
-    pub drag_factor: f64,
-}
-
-impl Default for Material {
-    fn default() -> Self {
-        Material {
-            diameter: 70e-6,
-            young: 3.9e9,
-            poisson: 0.3,
-            density: 1300.0,
-            damping: 2e-3,
-            bend_factor: 1.0,
-            twist_factor: 1.0,
-            stretch_factor: 1.0,
-            drag_factor: 1.0,
-        }
-    }
-}
-
-/// Model of a strand.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Model {
-    /// Discrete elastic rod.
-    #[default]
-    Rod,
-    /// Springs with altitude springs, calibrated to the material, robust integration.
-    Springs,
-    /// Springs with the paper's nine steps.
-    Paper,
-}
-
-/// How an end of a strand is held.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum End {
-    /// Not at all.
-    #[default]
-    Free,
-    /// Its point, free to turn.
-    Pinned,
-    /// Its point, its direction, and its turn about it.
-    Clamped,
-}
-
-/// How a layer is simulated; constant over a shot.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Settings {
-    /// Model of a strand.
-    pub model: Model,
-    /// What the hair is made of.
-    pub material: Material,
-    /// How roots are held.
-    pub root: End,
-    /// How tips are held.
-    pub tip: End,
-    /// Segments of a strand, equal in arc length; `None`: the input's points as they are.
-    pub segments: Option<usize>,
-    /// Steps in a span; `None`: chosen from the prescribed motion.
-    pub substeps: Option<u32>,
-    /// A stage ends when no segment would turn by more than this in all later iterations, radians. Above 1e-4 what is
-    /// left over spoils the guess of the next step, and costs accuracy and time; below 1e-7 steps take one more iteration
-    /// for nothing that can be seen.
-    pub tolerance: f64,
-    /// A strand that turns farther than this in a step takes smaller ones, radians.
-    pub largest_turn: f64,
-    /// Start in equilibrium under gravity.
-    pub sag_free: bool,
-    /// Largest strain that limiting leaves in a segment.
-    pub strain_limit: f64,
-    /// Coulomb friction with the body.
-    pub friction: f64,
-    /// Distance that hair keeps from the body, metres.
-    pub offset: f64,
-    /// A root that moves farther than this in a span takes its hair along without dynamics, metres.
-    pub teleport: f64,
-    /// Let strands at rest sleep.
-    pub sleep: bool,
-    /// Use the widest lanes of the processor. Changes no bit of the result.
-    pub wide: bool,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Settings {
-            model: Model::Rod,
-            root: End::Clamped,
-            tip: End::Free,
-            material: Material::default(),
-            segments: None,
-            substeps: None,
-            tolerance: 1e-5,
-            largest_turn: 0.2,
-            sag_free: true,
-            strain_limit: 0.01,
-            friction: 0.3,
-            offset: 0.5e-3,
-            teleport: 1.0,
-            sleep: true,
-            wide: true,
-        }
-    }
 }
 
 /// A root's placement relative to its rest pose, in the coordinates of [`Span::motion`].
@@ -286,13 +164,13 @@ pub struct Simulation {
 }
 
 /// Segments shorter than this have no direction, metres.
-const SHORTEST: f64 = 1e-9;
+pub(crate) const SHORTEST: f64 = 1e-9;
+
+/// Memory of a node of eight strands.
+const NODE_BYTES: usize = size_of::<stage::Node>() + size_of::<stage::Motion>() + size_of::<rod::Elastic>();
 
 /// Steps a second without motion of the body. Fewer and hair that swings freely takes steps of its own; more cost time.
 const STEPS_PER_SECOND: f64 = 192.0;
-
-/// Points between samples of the wind along a hair. One is exact and costs most of the step; the wind is smooth over many.
-const WIND_STRIDE: usize = 4;
 
 /// A strand that moves slower than this over two spans, with nothing around it moving, sleeps, metres per second. What it
 /// would still have moved is less than this times its longest period (about 1 s): a micrometre.
@@ -300,38 +178,6 @@ const SLEEP_SPEED: f64 = 1e-6;
 
 /// Farthest that the skin turns in a step, radians.
 const STEP_TURN: f64 = 0.1;
-
-impl Settings {
-    /// Checks the ranges.
-    pub fn check(&self) -> Result<(), SimError> {
-        let m = &self.material;
-        let positive = |name, value: f64| {
-            let ok = value.is_finite() && value > 0.0;
-            if ok { Ok(()) } else { Err(SimError::Setting { name, value, expected: "a number above 0" }) }
-        };
-        let at_least_0 = |name, value: f64| {
-            let ok = value.is_finite() && value >= 0.0;
-            if ok { Ok(()) } else { Err(SimError::Setting { name, value, expected: "a number of at least 0" }) }
-        };
-        positive("diameter", m.diameter)?;
-        positive("young", m.young)?;
-        positive("density", m.density)?;
-        positive("bend_factor", m.bend_factor)?;
-        positive("twist_factor", m.twist_factor)?;
-        positive("stretch_factor", m.stretch_factor)?;
-        at_least_0("drag_factor", m.drag_factor)?;
-        at_least_0("damping", m.damping)?;
-        if !(m.poisson > -1.0 && m.poisson <= 0.5) {
-            return Err(SimError::Setting { name: "poisson", value: m.poisson, expected: "above -1 and at most 0.5" });
-        }
-        positive("tolerance", self.tolerance)?;
-        positive("largest_turn", self.largest_turn)?;
-        positive("strain_limit", self.strain_limit)?;
-        positive("teleport", self.teleport)?;
-        at_least_0("friction", self.friction)?;
-        at_least_0("offset", self.offset)
-    }
-}
 
 impl Simulation {
     /// Prepares the hairs of a layer at rest under `gravity` (metres per second squared).
@@ -380,8 +226,7 @@ impl Simulation {
         let nodes: usize = group.iter().map(|g| g.node.len()).sum();
         let started = Started {
             particles: pick.len() as u64,
-            bytes: (nodes * (size_of::<stage::Node>() + size_of::<stage::Motion>())) as u64
-                + (nodes * size_of::<rod::Elastic>()) as u64,
+            bytes: (nodes * NODE_BYTES) as u64,
             stiffened: figures
                 .iter()
                 .flat_map(|f| &f.stiffened)
@@ -398,9 +243,8 @@ impl Simulation {
 
     /// Estimates the memory that [`Simulation::new`] will need, bytes, before any of it is taken.
     pub fn memory(hairs: usize, points: usize) -> u64 {
-        let node = size_of::<stage::Node>() + size_of::<stage::Motion>() + size_of::<rod::Elastic>();
         // Ghost nodes, input and output points.
-        (hairs.div_ceil(LANES) * (points + 1) * node + hairs * points * 28) as u64
+        (hairs.div_ceil(LANES) * (points + 1) * NODE_BYTES + hairs * points * 28) as u64
     }
 
     /// Moves through a span. `progress` is told the fraction done and may stop the work by returning false; then the
@@ -410,11 +254,9 @@ impl Simulation {
         span: &Span<'_>,
         progress: &(dyn Fn(f64) -> bool + Sync),
     ) -> Result<SpanReport, SimError> {
-        let (turn, steps) = self.steps(span);
-        let _ = turn;
-        let width = if self.settings.wide { Width::best() } else { Width::Plain };
+        let steps = self.steps(span);
         let method = Method {
-            width,
+            width: self.settings.width(),
             tolerance: self.settings.tolerance,
             friction: self.settings.friction,
             damping: Damping(self.settings.material.damping),
@@ -474,14 +316,14 @@ impl Simulation {
         Ok(report)
     }
 
-    /// Steps of a span, from what is prescribed only; and the skin's turn.
-    fn steps(&self, span: &Span<'_>) -> (f64, u32) {
+    /// Steps of a span, from what is prescribed only.
+    fn steps(&self, span: &Span<'_>) -> u32 {
         let samples = 8;
         let pose = |k: i32| (span.motion)(f64::from(k) / f64::from(samples));
         let turn: f64 = (0..samples).map(|k| pose(k).quaternion().angle_to(&pose(k + 1).quaternion())).sum();
         let least = (span.seconds * STEPS_PER_SECOND).max(turn / STEP_TURN);
         let automatic = if least.is_finite() { (least - 1e-6).ceil().clamp(1.0, 4096.0) as u32 } else { 1 };
-        (turn, self.settings.substeps.unwrap_or(automatic).max(1))
+        self.settings.substeps.unwrap_or(automatic).max(1)
     }
 
     /// Runs of [`Simulation::positions`], one a hair, in the order of the input.
@@ -491,15 +333,7 @@ impl Simulation {
 
     /// Points of every hair, root first, metres.
     pub fn positions(&self) -> Vec<[f64; 3]> {
-        let mut out = vec![[0.0; 3]; self.offsets.total()];
-        for (s, place) in self.place.iter().enumerate() {
-            if let Some((g, l)) = place {
-                let g = &self.group[*g as usize];
-                for i in self.offsets.range(s) {
-                    out[i] = g.x(g.at[*l as usize][self.pick[i] as usize] as usize, *l as usize).into();
-                }
-            }
-        }
+        let mut out = self.gather(Group::x);
         for r in &self.rider {
             for (p, i) in r.point.iter().zip(self.offsets.range(r.index)) {
                 out[i] = self.root[r.index].apply(p - r.point[0]).into();
@@ -510,12 +344,17 @@ impl Simulation {
 
     /// Velocities of the points of every hair, metres per second; 0 for hairs that ride with their roots.
     pub fn velocities(&self) -> Vec<[f64; 3]> {
+        self.gather(Group::v)
+    }
+
+    /// A value of the node behind every point; 0 for hairs that ride with their roots.
+    fn gather(&self, value: fn(&Group, usize, usize) -> Vec3) -> Vec<[f64; 3]> {
         let mut out = vec![[0.0; 3]; self.offsets.total()];
         for (s, place) in self.place.iter().enumerate() {
             if let Some((g, l)) = place {
-                let g = &self.group[*g as usize];
+                let (g, l) = (&self.group[*g as usize], *l as usize);
                 for i in self.offsets.range(s) {
-                    out[i] = g.v(g.at[*l as usize][self.pick[i] as usize] as usize, *l as usize).into();
+                    out[i] = value(g, g.at[l][self.pick[i] as usize] as usize, l).into();
                 }
             }
         }
@@ -617,15 +456,15 @@ fn sample(points: Vec<Vec3>, segments: Option<usize>) -> Vec<Vec3> {
 
 /// Moves a group through a span.
 fn move_group(g: &mut Group, scene: &Scene<'_>, method: &Method, steps: u32, work: &mut Work, done: &mut Moved) {
-    let saved = (g.motion.clone(), g.springs.as_ref().map_or(Vec::new(), |s| s.altitude.clone()));
     work.forget();
     if g.keep.most.is_empty() {
         g.keep = Keep::new(g, &scene.span.body.at(0.0), scene.settings.offset);
     }
+    let world = [0.0, 1.0].map(scene.span.motion);
     let mut lanes = [false; LANES];
     for l in 0..LANES {
         let Some(s) = g.strand[l] else { continue };
-        let (from, to) = (scene.root(s, 0.0), scene.root(s, 1.0));
+        let (from, to) = (scene.root(&world[0], s, 0.0), scene.root(&world[1], s, 1.0));
         let jump = (Vec3::from(to.translation) - Vec3::from(from.translation)).norm();
         if jump > scene.settings.teleport {
             done.teleported[l] = true;
@@ -637,6 +476,10 @@ fn move_group(g: &mut Group, scene: &Scene<'_>, method: &Method, steps: u32, wor
             lanes[l] = true;
         }
     }
+    if !lanes.contains(&true) {
+        return;
+    }
+    let saved = g.snapshot();
     if scene.settings.model == Model::Paper {
         let seconds = scene.span.seconds;
         let body = |f: f64| scene.solid().then(|| scene.span.body.at(f));
@@ -650,18 +493,19 @@ fn move_group(g: &mut Group, scene: &Scene<'_>, method: &Method, steps: u32, wor
             body: &body,
         };
         nine_steps::advance(g, scene, &span, lanes, &mut done.done);
-    }
-    for k in 0..if scene.settings.model == Model::Paper { 0 } else { steps } {
-        let length = 1.0 / f64::from(steps);
-        let at = Interval { start: f64::from(k) * length, length, span: scene.span.seconds };
-        integrate::advance(g, scene, method, at, lanes, 0, work, &mut done.done);
+    } else {
+        for k in 0..steps {
+            let length = 1.0 / f64::from(steps);
+            let at = Interval { start: f64::from(k) * length, length, span: scene.span.seconds };
+            integrate::advance(g, scene, method, at, lanes, 0, work, &mut done.done);
+        }
     }
     for l in 0..LANES {
         let Some(s) = g.strand[l] else { continue };
         if done.done.failed[l] {
             // Held: it rides with its root for this span, and starts again from rest.
-            g.revert(l, &saved.0, &saved.1);
-            g.carry(l, &scene.root(s, 0.0), &scene.root(s, 1.0));
+            g.revert(l, &saved);
+            g.carry(l, &scene.root(&world[0], s, 0.0), &scene.root(&world[1], s, 1.0));
             g.stop(l);
             Keep::carried(g, l, &scene.span.body.at(1.0));
         }
@@ -673,7 +517,7 @@ fn move_group(g: &mut Group, scene: &Scene<'_>, method: &Method, steps: u32, wor
             }
         }
     }
-    if scene.solid() && lanes.contains(&true) {
+    if scene.solid() {
         (done.corrected, done.deepest) = contact::correct(g, &scene.span.body.at(1.0));
     }
 }
@@ -688,164 +532,6 @@ struct Moved {
     deepest: f64,
 }
 
-/// A span as the integrator sees it.
-struct Scene<'a> {
-    span: &'a Span<'a>,
-    settings: &'a Settings,
-    last: &'a [Rigid],
-    /// Nothing around the hair moves in this span: neither skin, nor body, gravity, or wind.
-    calm: bool,
-}
-
 fn count_true(lanes: [bool; LANES]) -> u64 {
     lanes.iter().filter(|&&b| b).count() as u64
-}
-
-/// Whether nothing around the hair moves in a span.
-fn is_calm(span: &Span<'_>) -> bool {
-    let rests = |m: Motion<'_>| m(0.0) == m(0.5) && m(0.0) == m(1.0);
-    let part = |p: &crate::Part<'_>| rests(p.motion) && !matches!(p.shape, crate::Shape::Deforming(_));
-    let [a, b] = span.gravity;
-    span.wind.is_none() && a == b && rests(span.motion) && span.body.parts.iter().all(part)
-}
-
-fn is_finite(r: &Root) -> bool {
-    r.position.iter().chain(&r.rotation).all(|x| x.is_finite())
-}
-
-impl Scene<'_> {
-    /// A root or tip in the world at a fraction of the span.
-    fn placement(&self, ends: [&[Root]; 2], s: usize, fraction: f64) -> Rigid {
-        let [a, b] = [&ends[0][s], &ends[1][s]];
-        let f = fraction;
-        let dot: f64 = (0..4).map(|i| a.rotation[i] * b.rotation[i]).sum();
-        let sign = if dot < 0.0 { -1.0 } else { 1.0 };
-        let q: [f64; 4] = std::array::from_fn(|i| (1.0 - f) * a.rotation[i] + sign * f * b.rotation[i]);
-        let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
-        let local = Rigid {
-            rotation: q.map(|x| x / norm),
-            translation: std::array::from_fn(|i| (1.0 - f) * a.position[i] + f * b.position[i]),
-        };
-        let world = (self.span.motion)(fraction);
-        let turn = world.quaternion() * local.quaternion();
-        let [x, y, z, w] = [turn.i, turn.j, turn.k, turn.w];
-        Rigid { rotation: [x, y, z, w], translation: world.apply(Vec3::from(local.translation)).into() }
-    }
-
-    /// A root in the world; where it was last if it is not a number.
-    fn root(&self, s: usize, fraction: f64) -> Rigid {
-        let [a, b] = self.span.roots.map(|r| is_finite(&r[s]));
-        if a && b { self.placement(self.span.roots, s, fraction) } else { self.last[s] }
-    }
-
-    /// Every root at the end of the span; `None` where it is not a number.
-    fn all_roots(&self) -> Vec<Option<Rigid>> {
-        let one = |s: usize| {
-            let good = is_finite(&self.span.roots[1][s]);
-            good.then(|| self.placement([self.span.roots[1]; 2], s, 1.0))
-        };
-        (0..self.last.len()).map(one).collect()
-    }
-}
-
-/// Places an end and its ghost.
-fn hold_end(g: &mut Group, lane: usize, tip: bool, end: End, at: &Rigid) {
-    if end == End::Free {
-        return;
-    }
-    let Group { clamp, motion, .. } = g;
-    let clamp = &clamp[lane][usize::from(tip)];
-    let set = |to: &mut [Pack; 3], v: Vec3| {
-        for c in 0..3 {
-            to[c].0[lane] = v[c];
-        }
-    };
-    for (node, from) in &clamp.node {
-        set(&mut motion[*node as usize].x, at.apply(Vec3::from(*from)));
-    }
-    if let Some((edge, frame)) = clamp.frame {
-        set(&mut motion[edge as usize].m, at.quaternion() * Vec3::from(frame));
-    }
-}
-
-impl Around for Scene<'_> {
-    fn hold(&self, g: &mut Group, lanes: [bool; LANES], fraction: f64) {
-        for l in 0..LANES {
-            let (true, Some(s)) = (lanes[l], g.strand[l]) else { continue };
-            hold_end(g, l, false, self.settings.root, &self.root(s, fraction));
-            if let Some(tips) = self.span.tips {
-                hold_end(g, l, true, self.settings.tip, &self.placement(tips, s, fraction));
-            }
-        }
-    }
-
-    fn gravity(&self, fraction: f64) -> [f64; 3] {
-        let [a, b] = self.span.gravity;
-        std::array::from_fn(|c| (1.0 - fraction) * a[c] + fraction * b[c])
-    }
-
-    fn solid(&self) -> bool {
-        !self.span.body.parts.is_empty()
-    }
-
-    fn touch(
-        &self,
-        g: &Group,
-        start: &[stage::Motion],
-        lanes: [bool; LANES],
-        time: StageTime,
-        contact: &mut [Contact],
-    ) -> [bool; LANES] {
-        contact::find(g, start, &self.span.body.at(time.fraction), lanes, time.h, time.elapsed, contact)
-    }
-
-    fn air(&self, g: &Group, lanes: [bool; LANES], fraction: f64, air: &mut [Air]) -> bool {
-        let factor = self.settings.material.drag_factor;
-        if factor == 0.0 {
-            return false;
-        }
-        let time = self.span.time + fraction * self.span.seconds;
-        let still = drag::Air::default();
-        let wind = self.span.wind.map(|[a, b]| Wind::lerp(a, b, fraction));
-        let mut point: Vec<Vec3> = Vec::new();
-        let mut blowing = vec![Vec3::zeros(); g.node.len()];
-        for l in (0..LANES).filter(|&l| lanes[l] && g.strand[l].is_some()) {
-            let at = &g.at[l];
-            let n = at.len();
-            point.clear();
-            point.extend(at.iter().map(|&i| g.x(i as usize, l)));
-            if let Some(wind) = &wind {
-                wind.free_along(&point, WIND_STRIDE, time, &mut blowing[..n]);
-                if wind.boundary > 0.0 && self.solid() {
-                    let body = self.span.body.at(fraction);
-                    for (k, p) in point.iter().enumerate() {
-                        if body.distance_bound(*p) < wind.boundary {
-                            let hit = body.sample(*p);
-                            let surface =
-                                Surface { distance: hit.distance, normal: hit.normal, velocity: hit.velocity };
-                            blowing[k] = crate::wind::beside(blowing[k], &surface, wind.boundary);
-                        }
-                    }
-                }
-            }
-            let length: f64 = at.iter().map(|&i| g.node[i as usize].share.0[l]).sum();
-            for (k, &i) in at.iter().enumerate() {
-                let i = i as usize;
-                let share = g.node[i].share.0[l];
-                let e = point[(k + 1).min(n - 1)] - point[k.saturating_sub(1)];
-                let t = e.try_normalize(SHORTEST).unwrap_or(Vec3::zeros());
-                let u = g.v(i, l) - blowing[k];
-                let along = t.dot(&u);
-                let across = (u - t * along).norm();
-                let d = drag::drag(&still, self.settings.material.diameter, length, across, along.abs());
-                for c in 0..3 {
-                    air[i].velocity[c].0[l] = blowing[k][c];
-                    air[i].tangent[c].0[l] = t[c];
-                }
-                air[i].across.0[l] = d.across * share * factor;
-                air[i].along.0[l] = d.along * share * factor;
-            }
-        }
-        true
-    }
 }

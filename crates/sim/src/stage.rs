@@ -4,7 +4,7 @@
 //! where the hair would fly freely, and `E` holds elasticity, contact, and (linearised) drag and friction. Each
 //! iteration assembles a positive definite matrix and gradient per node, solves the band directly, and moves.
 
-use crate::band::{HELD, Window};
+use crate::band::Window;
 use crate::lanes::{Lanes, Pack, dot, load3, scale3, sub3};
 
 /// Longest turn of a segment in one iteration, radians. Above about 1 an iteration may jump to a wrong fold; below 0.1
@@ -20,9 +20,9 @@ const STICK_SPEED: f64 = 1e-5;
 pub struct Node {
     /// Kilograms.
     pub mass: Pack,
-    /// 0, or [`HELD`] if the position is prescribed.
+    /// 0, or [`crate::band::HELD`] if the position is prescribed.
     pub held: Pack,
-    /// 0, or [`HELD`] if the turn of the edge behind the node is prescribed.
+    /// 0, or [`crate::band::HELD`] if the turn of the edge behind the node is prescribed.
     pub held_turn: Pack,
     /// Rest length of the edge from this node to the next, metres.
     pub length: Pack,
@@ -169,9 +169,4 @@ pub fn open_node<L: Lanes, const D: usize, const ROWS: usize>(
     for slot in rhs.iter_mut().skip(3) {
         *slot = Pack::default();
     }
-}
-
-/// A held unknown's diagonal.
-pub fn held(is: bool) -> f64 {
-    if is { HELD } else { 0.0 }
 }

@@ -1,68 +1,19 @@
-//! Strands against closed forms and laws.
+//! Strands in motion, at rest and under abuse.
 
-use pelage_geom::Offsets;
-use pelage_sim::{Body, End, Hairs, Material, Model, Rigid, Root, Settings, Simulation, Span};
+mod common;
 
-fn still(_: f64) -> Rigid {
-    Rigid::default()
-}
+use common::{GRAVITY, Shot, Vec3, plain, rod, straight};
+use pelage_sim::{Body, Material, Model, Rigid, Settings};
 
-/// Material with the given w L^3 / B for a rod of length 1 m under 9.81 m/s2, hardly extensible.
-fn material(gamma: f64) -> Material {
-    let m = Material { drag_factor: 0.0, damping: 0.0, diameter: 1e-3, ..Material::default() };
-    let area = std::f64::consts::FRAC_PI_4 * 1e-6;
-    let bend = m.density * area * 9.81 / gamma;
-    Material { young: bend / (area * 1e-6 / 16.0), ..m }
-}
-
-fn straight(segments: usize) -> Vec<[f64; 3]> {
-    (0..=segments).map(|i| [i as f64 / segments as f64, 0.0, 0.0]).collect()
-}
-
-fn released(model: Model, segments: usize, steps: u32, gamma: f64, tolerance: f64) -> Vec<[f64; 3]> {
-    let points = straight(segments);
-    let settings = Settings {
-        model,
-        root: End::Clamped,
-        material: material(gamma),
-        substeps: Some(steps),
-        sag_free: false,
-        tolerance,
-        largest_turn: 10.0,
-        sleep: false,
-        ..Settings::default()
+/// Tips of a horizontal rod at 1, 2, 3 sqrt(L / g) after its release.
+fn released(model: Model, segments: usize, steps: u32, gamma: f64, tolerance: f64) -> Vec<Vec3> {
+    let settings = Settings { substeps: Some(steps), tolerance, ..plain(model, rod(gamma)) };
+    let mut shot = Shot::new(&[straight(segments, Vec3::x())], &settings, GRAVITY);
+    let tip = |_| {
+        shot.wait((1.0f64 / common::G).sqrt());
+        shot.tip(0)
     };
-    let offsets = Offsets::uniform(1, points.len());
-    let hairs = Hairs { offsets: &offsets, position: &points, id: &[1] };
-    let g = [0.0, -9.81, 0.0];
-    let (mut sim, _) = Simulation::new(&hairs, &settings, g).unwrap();
-    let root = [Root { position: points[0], rotation: [0.0, 0.0, 0.0, 1.0] }];
-    let body = Body::default();
-    let seconds = (1.0f64 / 9.81).sqrt();
-    let mut tips = Vec::new();
-    for k in 0..3 {
-        let span = Span {
-            seconds,
-            time: f64::from(k) * seconds,
-            motion: &still,
-            roots: [&root, &root],
-            tips: None,
-            body: &body,
-            gravity: [g, g],
-            wind: None,
-        };
-        let r = sim.advance(&span, &|_| true).unwrap();
-        let p = sim.positions();
-        tips.push(p[segments]);
-        println!(
-            "{segments} segments, {steps} steps: tip {:?} strain {:.1e} solves per node and stage {:.2} subdivided {}",
-            p[segments],
-            r.largest_strain,
-            r.particle_solves as f64 / r.particle_steps as f64 / 2.0,
-            r.subdivided
-        );
-    }
-    tips
+    (0..3).map(tip).collect()
 }
 
 #[test]
@@ -95,6 +46,10 @@ fn human(length: f64, direction: [f64; 3], curl: f64, segments: usize) -> Vec<[f
         .collect()
 }
 
+fn without_air() -> Material {
+    Material { drag_factor: 0.0, ..Material::default() }
+}
+
 #[test]
 fn a_groomed_pose_stays() {
     for (length, direction, curl) in [
@@ -106,92 +61,32 @@ fn a_groomed_pose_stays() {
         (0.05, [0.0, 1.0, 0.0], 0.0),
     ] {
         let points = human(length, direction, curl, 40);
-        let offsets = Offsets::uniform(1, points.len());
-        let settings = Settings {
-            material: Material { drag_factor: 0.0, ..Material::default() },
-            sleep: false,
-            ..Settings::default()
-        };
-        let g = [0.0, -9.81, 0.0];
-        let hairs = Hairs { offsets: &offsets, position: &points, id: &[1] };
-        let (mut sim, started) = Simulation::new(&hairs, &settings, g).unwrap();
-        let root = [Root { position: points[0], rotation: [0.0, 0.0, 0.0, 1.0] }];
-        let body = Body::default();
-        for k in 0..24 {
-            let span = Span {
-                seconds: 1.0 / 24.0,
-                time: f64::from(k) / 24.0,
-                motion: &still,
-                roots: [&root, &root],
-                tips: None,
-                body: &body,
-                gravity: [g, g],
-                wind: None,
-            };
-            sim.advance(&span, &|_| true).unwrap();
-        }
-        let p = sim.positions();
-        let drift = p
-            .iter()
-            .zip(&points)
-            .map(|(a, b)| (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>().sqrt())
-            .fold(0.0, f64::max);
-        println!(
-            "length {length} direction {direction:?} curl {curl}: drift {:.1e} L, gamma {:.1}, stiffened {:?}",
-            drift / length,
-            started.largest_gamma,
-            started.stiffened
-        );
+        let settings = Settings { material: without_air(), sleep: false, ..Settings::default() };
+        let mut shot = Shot::new(std::slice::from_ref(&points), &settings, GRAVITY);
+        shot.steps(24, 1.0 / 24.0);
+        let hair = shot.hair(0);
+        let drift = hair.iter().zip(&points).map(|(a, b)| (a - Vec3::from(*b)).norm()).fold(0.0, f64::max);
+        assert!(drift < 1e-9 * length, "length {length} direction {direction:?} curl {curl}: {drift} m");
     }
 }
 
 #[test]
 fn a_violent_shake_stays_bounded_at_every_step() {
     // 10 g at 5 Hz, sideways.
-    let amplitude = 98.1 / (2.0 * std::f64::consts::PI * 5.0f64).powi(2);
+    let rate = 2.0 * std::f64::consts::PI * 5.0;
+    let amplitude = 98.1 / (rate * rate);
+    let settings = Settings { material: without_air(), substeps: Some(1), ..Settings::default() };
     for fps in [1667.0, 480.0, 120.0, 24.0, 12.0, 1.0] {
-        let points = human(0.2, [0.0, -1.0, 0.0], 0.0, 50);
-        let offsets = Offsets::uniform(1, points.len());
-        let settings = Settings {
-            material: Material { drag_factor: 0.0, ..Material::default() },
-            substeps: Some(1),
-            ..Settings::default()
-        };
-        let g = [0.0, -9.81, 0.0];
-        let hairs = Hairs { offsets: &offsets, position: &points, id: &[1] };
-        let (mut sim, _) = Simulation::new(&hairs, &settings, g).unwrap();
-        let root = [Root { position: points[0], rotation: [0.0, 0.0, 0.0, 1.0] }];
-        let body = Body::default();
-        let (mut strain, mut fast, mut solves, mut steps, mut held) = (0.0f64, 0.0f64, 0, 0, 0);
+        let mut shot = Shot::new(&[human(0.2, [0.0, -1.0, 0.0], 0.0, 50)], &settings, GRAVITY);
         for k in 0..(2.0 * fps) as usize {
             let start = k as f64 / fps;
             let motion = move |f: f64| Rigid {
-                translation: [amplitude * libm::sin(2.0 * std::f64::consts::PI * 5.0 * (start + f / fps)), 0.0, 0.0],
+                translation: [amplitude * libm::sin(rate * (start + f / fps)), 0.0, 0.0],
                 ..Rigid::default()
             };
-            let span = Span {
-                seconds: 1.0 / fps,
-                time: start,
-                motion: &motion,
-                roots: [&root, &root],
-                tips: None,
-                body: &body,
-                gravity: [g, g],
-                wind: None,
-            };
-            let r = sim.advance(&span, &|_| true).unwrap();
-            strain = strain.max(r.largest_strain);
-            held += r.held.len();
-            solves += r.particle_solves;
-            steps += r.particle_steps;
-            fast =
-                sim.velocities().iter().map(|v| (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()).fold(fast, f64::max);
+            shot.go(1.0 / fps, &motion, &Body::default(), None);
+            let last = &shot.last;
+            assert!(last.largest_strain <= 0.01 && last.held.is_empty(), "{fps} steps a second: {last:?}");
         }
-        println!(
-            "fps {fps}: strain {strain:.1e} fastest {fast:.1} m/s solves/step {:.2} steps {} held {held}",
-            solves as f64 / steps as f64,
-            steps / 52
-        );
-        assert!(strain <= 0.01 && held == 0);
     }
 }

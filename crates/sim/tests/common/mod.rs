@@ -27,7 +27,7 @@ pub fn in_vacuum() -> Material {
     Material { drag_factor: 0.0, damping: 0.0, ..Material::default() }
 }
 
-/// Every model that moves; those not listed are not wired in.
+/// Models that the tests of physics are run with.
 pub const MODELS: [Model; 1] = [Model::Rod];
 
 /// Size of gravity in the tests, metres per second squared.
