@@ -12,7 +12,7 @@ use crate::stage::{Contact, Motion};
 
 /// Stiffness of contact over a node's inertia m / h^2: the share of a step's approach that is left as depth is one over
 /// this. Below 100, fast approaches end 0.1 mm deep; above 1e6 the matrix loses digits to it.
-const STIFFNESS: f64 = 2e3;
+const STIFFNESS: f64 = 1e2;
 
 /// Points that are inside come out no faster than this, metres per second. Faster, and hair born inside jumps; slower,
 /// and it stays there for seconds.
@@ -24,6 +24,11 @@ const NEAR: f64 = 2e-3;
 /// Depth at which the exact mesh pushes a point out, metres. Much less than 0.1 mm, which is what may be seen; more than
 /// what contact leaves.
 const VISIBLE: f64 = 2e-5;
+
+/// Stiffness of friction's grip over a node's mass, one over square seconds. Hair gives way by its normal force over its
+/// mass times friction over this before it slips: 7 micrometres for hair that lies by its weight, under friction 0.3.
+/// Much above the inertia 1 / h^2 of a usual stage iterations find the onset of sliding slowly; below, pressed hair creeps.
+const GRIP: f64 = 4.3e5;
 
 /// How close points of a group may come to the body.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -82,9 +87,12 @@ pub fn find(
     let mut any = [false; LANES];
     for i in 0..g.node.len() {
         for l in 0..LANES {
+            if !lanes[l] {
+                continue;
+            }
             let c = &mut contact[i];
             c.stiffness.0[l] = 0.0;
-            if !lanes[l] || !is_free(g, i, l) {
+            if !is_free(g, i, l) {
                 continue;
             }
             let p = g.x(i, l);
@@ -92,45 +100,54 @@ pub fn find(
             let reach = most + NEAR + 0.5 * h * g.v(i, l).norm();
             let near = body.distance_bound(p) <= reach;
             let Some(hit) = near.then(|| body.sample(p)).filter(|hit| hit.distance < reach) else {
-                (c.force.0[l], c.drag.0[l]) = (0.0, 0.0);
+                (c.force.0[l], c.hold.0[l]) = (0.0, 0.0);
                 continue;
             };
             any[l] = true;
             let mut keep = most;
+            let Motion { x, grip, .. } = &start[i];
+            // Where it was before the step, carried along by the body.
+            let carried: Vec3 = std::array::from_fn(|k| x[k].0[l] + hit.velocity[k] * elapsed).into();
             if g.keep.inside[i].0[l] > 0.0 {
-                // Where it was before the step, from the same plane; it may come out a little from there.
-                let x = &start[i].x;
-                let moved = p - Vec3::new(x[0].0[l], x[1].0[l], x[2].0[l]);
-                let before = hit.distance - hit.normal.dot(&(moved - hit.velocity * elapsed));
+                // From the same plane; it may come out a little from there.
+                let before = hit.distance - hit.normal.dot(&(p - carried));
                 keep = most.min(before + WAY_OUT * elapsed);
             }
             c.level.0[l] = hit.normal.dot(&p) - hit.distance + keep;
             for k in 0..3 {
                 c.normal[k].0[l] = hit.normal[k];
                 c.velocity[k].0[l] = hit.velocity[k];
+                c.anchor[k].0[l] = carried[k] - grip[k].0[l];
             }
+            c.grip.0[l] = GRIP * g.node[i].mass.0[l];
             c.stiffness.0[l] = STIFFNESS * g.node[i].mass.0[l] / (h * h);
         }
     }
     any
 }
 
-/// After a step: no bounce (the relative normal velocity of touching points is 0, not outward).
+/// After a step: no bounce (the relative normal velocity of touching points is 0, not outward), and grips as far as they
+/// were dragged.
 pub fn settle(g: &mut Group, contact: &[Contact], lanes: [bool; LANES]) {
     let mut touching = [false; LANES];
     for i in 0..g.node.len() {
-        for l in 0..LANES {
+        for l in (0..LANES).filter(|&l| lanes[l]) {
             let c = &contact[i];
-            if !lanes[l] || c.stiffness.0[l] == 0.0 || c.force.0[l] == 0.0 {
+            if c.stiffness.0[l] == 0.0 || c.force.0[l] == 0.0 {
+                for p in &mut g.motion[i].grip {
+                    p.0[l] = 0.0;
+                }
                 continue;
             }
-            let n = Vec3::new(c.normal[0].0[l], c.normal[1].0[l], c.normal[2].0[l]);
-            let surface = Vec3::new(c.velocity[0].0[l], c.velocity[1].0[l], c.velocity[2].0[l]);
-            let away = n.dot(&(g.v(i, l) - surface));
-            if away > 0.0 {
-                for k in 0..3 {
-                    g.motion[i].v[k].0[l] -= away * n[k];
-                }
+            let at = |v: &[Pack; 3]| Vec3::new(v[0].0[l], v[1].0[l], v[2].0[l]);
+            let n = at(&c.normal);
+            let away = n.dot(&(g.v(i, l) - at(&c.velocity))).max(0.0);
+            let off = g.x(i, l) - at(&c.anchor);
+            let slip = (off - n * n.dot(&off)) * (c.hold.0[l] / c.grip.0[l]);
+            let m = &mut g.motion[i];
+            for k in 0..3 {
+                m.v[k].0[l] -= away * n[k];
+                m.grip[k].0[l] = slip[k];
             }
             touching[l] = true;
         }

@@ -308,7 +308,7 @@ impl Group {
         for i in 0..self.count[lane] {
             let x = to.apply(from.invert(self.x(i, lane)));
             let m = &mut self.motion[i];
-            for field in [&mut m.v, &mut m.a, &mut m.m] {
+            for field in [&mut m.v, &mut m.a, &mut m.m, &mut m.grip] {
                 let new = turn * Vec3::new(field[0].0[lane], field[1].0[lane], field[2].0[lane]);
                 for c in 0..3 {
                     field[c].0[lane] = new[c];
@@ -370,6 +370,7 @@ impl Group {
                 to.v[c].0[lane] = from.v[c].0[lane];
                 to.a[c].0[lane] = from.a[c].0[lane];
                 to.m[c].0[lane] = from.m[c].0[lane];
+                to.grip[c].0[lane] = from.grip[c].0[lane];
             }
         }
     }

@@ -18,10 +18,13 @@ use crate::lanes::{self, LANES, Pack, Width};
 use crate::rod::{Damping, Scratch, Watch};
 use crate::springs::paper::FORGET;
 use crate::stage::{Air, Contact, Motion, Stage};
-use kernels::{Choose, Finish, Iterate, IterateSprings, LimitSprings, Look, Predict};
+use kernels::{Choose, Finish, Iterate, IterateSprings, LimitSprings, Look, Origin, Predict};
 
 /// The fraction of a step that each stage spans: 1 - 1 / sqrt 2.
 const GAMMA: f64 = 0.292_893_218_813_452_5;
+
+/// Weight of both earlier derivatives in the last stage of TR-BDF2: sqrt 2 / 4.
+const WEIGHT: f64 = 0.353_553_390_593_273_8;
 
 /// What the last stage of TR-BDF2 takes from the first stage's movement: (1 - c)^2 / (c (2 - c)), c = 2 - sqrt 2.
 const TURN_CARRIED: f64 = 0.207_106_781_186_547_5;
@@ -40,9 +43,8 @@ const ITERATIONS: usize = 8;
 /// shows it; below 1e-3, strands halve their steps for nothing.
 const CONTACT_TOLERANCE: f64 = 1e-2;
 
-/// Iterations in which friction follows: the first, with the normal forces of the last stage, and the third, with those of
-/// the second's positions. With the first only, hair sticks and slips a stage late; with many, some never settles.
-const FRICTION_ITERATIONS: [usize; 2] = [0, 2];
+/// Iterations in which friction follows; in later ones it stays, so that they converge. With few, sliding begins late.
+const FRICTION_ITERATIONS: usize = 6;
 
 /// The first iteration counts as well converged if it turns less than this times the tolerance's root, radians: what the
 /// guess from the last acceleration leaves. Larger, errors of fast motion stay; smaller, calm hair iterates twice.
@@ -174,7 +176,7 @@ pub fn advance<A: Around>(
     let now: [bool; LANES] = std::array::from_fn(|l| wanted[l] && !deeper[l]);
     if now.contains(&true) {
         let saved = save(g, work, depth);
-        let converged = step_each(g, around, method, at, now, &saved, work, done);
+        let converged = step(g, around, method, at, now, &saved.motion, work, done);
         let seen = look(g, method, &saved.motion);
         for l in 0..LANES {
             let finite = seen.finite.0[l] == 0.0;
@@ -251,43 +253,10 @@ fn save(g: &Group, work: &mut Work, depth: u8) -> Snapshot {
     saved
 }
 
-/// A step of strands that know their acceleration, and of those that do not (at the start, in contact, after limiting):
-/// these take SDIRK2 (R. Alexander 1977), which needs none. Returns the lanes that converged.
-#[allow(clippy::too_many_arguments)]
-fn step_each<A: Around>(
-    g: &mut Group,
-    around: &A,
-    method: &Method,
-    at: Interval,
-    lanes: [bool; LANES],
-    saved: &Snapshot,
-    work: &mut Work,
-    done: &mut Done,
-) -> [bool; LANES] {
-    let unknown = |l: usize| g.motion[..g.count[l]].iter().all(|m| m.a.iter().all(|a| a.0[l] == 0.0));
-    let cold: [bool; LANES] = std::array::from_fn(|l| lanes[l] && unknown(l));
-    let warm: [bool; LANES] = std::array::from_fn(|l| lanes[l] && !cold[l]);
-    if !cold.contains(&true) {
-        return step(g, around, method, at, warm, false, &saved.motion, work, done);
-    }
-    let mut converged = step(g, around, method, at, cold, true, &saved.motion, work, done);
-    if warm.contains(&true) {
-        let kept = g.snapshot();
-        for l in (0..LANES).filter(|&l| !cold[l]) {
-            g.revert(l, saved);
-        }
-        let others = step(g, around, method, at, warm, false, &saved.motion, work, done);
-        for l in 0..LANES {
-            if cold[l] {
-                g.revert(l, &kept);
-            }
-            converged[l] |= others[l];
-        }
-    }
-    converged
-}
-
-/// Both stages; returns the lanes that converged.
+/// Both stages of a step; returns the lanes that converged.
+///
+/// Strands that know their acceleration take TR-BDF2; those that do not (at the start, in contact, after limiting) take
+/// SDIRK2 (R. Alexander 1977), which needs none. Both have two implicit steps of the same length, from other origins.
 #[allow(clippy::too_many_arguments)]
 fn step<A: Around>(
     g: &mut Group,
@@ -295,7 +264,6 @@ fn step<A: Around>(
     method: &Method,
     at: Interval,
     lanes: [bool; LANES],
-    cold: bool,
     before: &[Motion],
     work: &mut Work,
     done: &mut Done,
@@ -317,41 +285,56 @@ fn step<A: Around>(
         work.straight.reserve(n);
     }
     let h = GAMMA * dt;
-    let (mut converged, mut touched) = (lanes, [false; LANES]);
-    let first = if cold { GAMMA } else { 2.0 * GAMMA };
-    let carried = if cold { 1.0 - (1.0 - GAMMA) / GAMMA } else { -TURN_CARRIED };
+    let (mut converged, mut touching) = (lanes, [false; LANES]);
+    let unknown = |l: usize| g.motion[..g.count[l]].iter().all(|m| m.a.iter().all(|a| a.0[l] == 0.0));
+    let cold: [bool; LANES] = std::array::from_fn(|l| lanes[l] && unknown(l));
+    let warm: [bool; LANES] = std::array::from_fn(|l| lanes[l] && !cold[l]);
+    let pick = |if_cold: f64, if_warm: f64| Pack(cold.map(|cold| if cold { if_cold } else { if_warm }));
+    let carried = pick(1.0 - (1.0 - GAMMA) / GAMMA, -TURN_CARRIED);
     let blowing = around.air(g, lanes, at.start, &mut work.air);
     for l in (0..LANES).filter(|&l| lanes[l]) {
         work.left.0[l] = 0.0;
     }
     work.turned.fill(Pack::default());
-    for (second, fraction) in [(false, at.start + first * at.length), (true, at.start + at.length)] {
-        let gravity = around.gravity(fraction);
-        let rest = dt - h;
-        if second {
+    for second in [false, true] {
+        let reached = if second { [1.0, 1.0] } else { [GAMMA, 2.0 * GAMMA] };
+        let origin = if second {
             // Turns count from where the first stage's rate would have brought them, as positions do from `base`.
             for t in &mut work.turned {
-                t.0 = t.0.map(|t| t * carried);
+                for l in 0..LANES {
+                    t.0[l] *= carried.0[l];
+                }
+            }
+            Origin::Second { before: pick(0.0, WEIGHT * dt - h), first: pick(dt - h, WEIGHT * dt), weight: WEIGHT * dt }
+        } else {
+            Origin::First(pick(0.0, h))
+        };
+        let pulls = reached.map(|r| around.gravity(at.start + r * at.length));
+        let gravity = std::array::from_fn(|c| pick(pulls[0][c], pulls[1][c]));
+        let Work { y, base, from, .. } = work;
+        lanes::run(method.width, Predict { motion: &mut g.motion, y, base, from, h, origin, gravity });
+        for (lanes, reached) in [(cold, reached[0]), (warm, reached[1])] {
+            if !lanes.contains(&true) {
+                continue;
+            }
+            let time = StageTime { fraction: at.start + reached * at.length, h, elapsed: reached * dt };
+            around.hold(g, lanes, time.fraction);
+            prescribe(g, lanes, work, before, time);
+            if around.solid() {
+                let found = around.touch(g, before, lanes, time, &mut work.contact);
+                for l in (0..LANES).filter(|&l| lanes[l]) {
+                    touching[l] = found[l];
+                }
             }
         }
-        let Work { y, base, from, .. } = work;
-        lanes::run(method.width, Predict { motion: &mut g.motion, y, base, from, h, rest, gravity, second, cold, dt });
-        around.hold(g, lanes, fraction);
-        let elapsed = (fraction - at.start) * at.span;
-        prescribe(g, work, before, h, elapsed);
-        let time = StageTime { fraction, h, elapsed };
-        let touching =
-            if around.solid() { around.touch(g, before, lanes, time, &mut work.contact) } else { [false; LANES] };
-        let acting = Acting { h, touching, blowing };
-        let stage_ok = solve(g, method, acting, lanes, work, done);
+        let stage_ok = solve(g, method, Acting { h, touching, blowing }, lanes, work, done);
         for l in 0..LANES {
-            touched[l] |= touching[l];
             converged[l] &= stage_ok[l];
         }
     }
     let Work { base, from, .. } = work;
     lanes::run(method.width, Finish { motion: &mut g.motion, base, from, h });
-    if touched.contains(&true) {
+    if around.solid() {
         contact::settle(g, &work.contact, lanes);
     }
     let count: usize = (0..LANES).filter(|&l| lanes[l]).map(|l| g.count[l]).sum();
@@ -360,18 +343,18 @@ fn step<A: Around>(
 }
 
 /// Gives held nodes their prescribed velocity, and no inertia.
-fn prescribe(g: &Group, work: &mut Work, before: &[Motion], h: f64, elapsed: f64) {
+fn prescribe(g: &Group, lanes: [bool; LANES], work: &mut Work, before: &[Motion], time: StageTime) {
     for i in 0..g.node.len() {
         if g.node[i].held.0 == [0.0; LANES] {
             continue;
         }
-        for l in 0..LANES {
+        for l in (0..LANES).filter(|&l| lanes[l]) {
             if g.node[i].held.0[l] == HELD {
                 for c in 0..3 {
                     let x = g.motion[i].x[c].0[l];
-                    let v = (x - before[i].x[c].0[l]) / elapsed;
+                    let v = (x - before[i].x[c].0[l]) / time.elapsed;
                     work.y[i][c].0[l] = x;
-                    work.base[i][c].0[l] = x - h * v;
+                    work.base[i][c].0[l] = x - time.h * v;
                     work.from[i][c].0[l] = v;
                 }
             }
@@ -406,7 +389,7 @@ fn solve(
             base: &work.base,
             contact: touching.contains(&true).then_some(&mut work.contact),
             friction: method.friction,
-            refresh: FRICTION_ITERATIONS.contains(&iteration),
+            refresh: iteration < FRICTION_ITERATIONS,
             solved: iteration > 0,
             air: blowing.then_some(&work.air),
             active: mask(active),

@@ -372,7 +372,7 @@ impl Simulation {
                 let (g, l) = (&self.group[*g as usize], *l as usize);
                 out.extend([f64::from(g.level[l]), f64::from(g.quiet[l])]);
                 for (i, m) in g.motion[..g.count[l]].iter().enumerate() {
-                    out.extend([&m.x, &m.v, &m.a, &m.m].into_iter().flatten().map(|p| p.0[l]));
+                    out.extend([&m.x, &m.v, &m.a, &m.m, &m.grip].into_iter().flatten().map(|p| p.0[l]));
                     // Not a number before the first span.
                     let keep = |p: &[Pack]| p.get(i).map_or(f64::NAN, |p| p.0[l]);
                     out.extend([keep(&g.keep.most), keep(&g.keep.inside)]);
@@ -388,7 +388,7 @@ impl Simulation {
 
     /// Numbers that are saved of a node.
     fn node_values(&self) -> usize {
-        if self.settings.model == Model::Rod { 14 } else { 19 }
+        if self.settings.model == Model::Rod { 17 } else { 22 }
     }
 
     /// Takes over a saved state.
@@ -412,7 +412,7 @@ impl Simulation {
                 g.quiet[l] = next() as u32;
                 for i in 0..g.count[l] {
                     let m = &mut g.motion[i];
-                    for p in [&mut m.x, &mut m.v, &mut m.a, &mut m.m].into_iter().flatten() {
+                    for p in [&mut m.x, &mut m.v, &mut m.a, &mut m.m, &mut m.grip].into_iter().flatten() {
                         p.0[l] = next();
                     }
                     let (most, inside) = (next(), next());

@@ -11,10 +11,6 @@ use crate::lanes::{Lanes, Pack, dot, load3, scale3, sub3};
 /// large steps need many iterations.
 pub const LARGEST_TURN: f64 = 0.5;
 
-/// Sliding slower than this counts as sticking, metres per second: Coulomb friction is viscous below it. Above 1e-3
-/// hair creeps visibly on slopes; below 1e-7 the lagged iteration needs many passes.
-const STICK_SPEED: f64 = 1e-5;
-
 /// What nodes are, constant over a shot.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Node {
@@ -41,6 +37,8 @@ pub struct Motion {
     pub a: [Pack; 3],
     /// First material direction of the edge from this node to the next, a unit vector. Rods with twist only.
     pub m: [Pack; 3],
+    /// How far friction has dragged its grip on the body, metres: see [`Contact::anchor`].
+    pub grip: [Pack; 3],
 }
 
 /// Contact of a node with the body: a plane that it may not cross.
@@ -56,8 +54,13 @@ pub struct Contact {
     pub velocity: [Pack; 3],
     /// Normal force of the last iteration, newtons.
     pub force: Pack,
-    /// Friction as a viscous drag, newton second per metre.
-    pub drag: Pack,
+    /// Where friction pulls the node to, along the plane, with the stiffness `grip`, but no harder than Coulomb allows:
+    /// below the limit hair sticks without creeping, above it the anchor is dragged along.
+    pub anchor: [Pack; 3],
+    /// Newton per metre, as long as nothing slips.
+    pub grip: Pack,
+    /// Newton per metre in this iteration.
+    pub hold: Pack,
 }
 
 /// The air at a node.
@@ -123,9 +126,9 @@ pub fn open_node<L: Lanes, const D: usize, const ROWS: usize>(
     for c in 0..3 {
         p.0[c][c] = diagonal;
     }
-    let velocity = scale3(sub3(x, load3(&stage.base[j])), inverse_h);
     if let Some(air) = stage.air {
         let air = &air[j];
+        let velocity = scale3(sub3(x, load3(&stage.base[j])), inverse_h);
         let relative = sub3(velocity, load3(&air.velocity));
         let (across, along) = (L::load(&air.across), L::load(&air.along));
         let tangent = load3::<L>(&air.tangent);
@@ -144,22 +147,24 @@ pub fn open_node<L: Lanes, const D: usize, const ROWS: usize>(
         let depth = (L::load(&contact.level) - dot(n, x)).max(zero);
         let stiffness = L::if_gt(depth, zero, L::load(&contact.stiffness), zero);
         let force = stiffness * depth;
-        let relative = sub3(velocity, load3(&contact.velocity));
-        let slide = crate::lanes::neg_mul_add3(n, dot(n, relative), relative);
-        let speed = dot(slide, slide).sqrt().max(L::splat(STICK_SPEED));
-        // The force of the last iteration sets the friction, so that the matrix stays symmetric.
+        let off = sub3(x, load3(&contact.anchor));
+        let slip = crate::lanes::neg_mul_add3(n, dot(n, off), off);
+        // The force of the last iteration sets the limit, so that the matrix stays symmetric; a secant of the force that
+        // does not grow any more lies above it, so that iterations go down.
         if stage.refresh {
-            (L::splat(stage.friction) * L::load(&contact.force) / speed).store(&mut contact.drag);
+            let reach = dot(slip, slip).sqrt().max(L::splat(1e-12));
+            let limit = L::splat(stage.friction) * L::load(&contact.force) / reach;
+            limit.min(L::load(&contact.grip)).store(&mut contact.hold);
         }
-        let drag = L::if_gt(depth, zero, L::load(&contact.drag), zero);
+        let hold = L::if_gt(depth, zero, L::load(&contact.hold), zero);
         if stage.solved {
             force.store(&mut contact.force);
         }
         for r in 0..3 {
-            b[r] = drag.neg_mul_add(slide[r], force.mul_add(n[r], b[r]));
-            p.0[r][r] = drag.mul_add(inverse_h, p.0[r][r]);
+            b[r] = hold.neg_mul_add(slip[r], force.mul_add(n[r], b[r]));
+            p.0[r][r] = p.0[r][r] + hold;
             for c in 0..=r {
-                p.0[r][c] = (drag.neg_mul_add(inverse_h, stiffness) * n[r]).mul_add(n[c], p.0[r][c]);
+                p.0[r][c] = ((stiffness - hold) * n[r]).mul_add(n[c], p.0[r][c]);
             }
         }
     }

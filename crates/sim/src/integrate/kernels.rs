@@ -2,14 +2,11 @@
 
 use crate::band::{self, Panel, RING, Window};
 use crate::group::Group;
-use crate::lanes::{self, Kernel, L3, LANES, Lanes, Pack, load3, mul_add3, scale3, store3, sub3};
+use crate::lanes::{Kernel, L3, LANES, Lanes, Pack, load3, mul_add3, scale3, store3, sub3};
 use crate::rod::{self, Damping, Scratch, Watch};
 use crate::springs::kernel;
 use crate::springs::paper::limit_strain as limit_springs;
 use crate::stage::{Motion, Stage, open_node};
-
-/// Weight of both earlier derivatives in the last stage of TR-BDF2: sqrt 2 / 4.
-const WEIGHT: f64 = 0.353_553_390_593_273_8;
 
 /// One iteration of a rod.
 pub(super) struct Iterate<'a, 'b, const D: usize, const ROWS: usize> {
@@ -130,6 +127,20 @@ impl Kernel for LimitSprings<'_> {
     }
 }
 
+/// What a stage starts from, per lane.
+#[derive(Clone, Copy)]
+pub(super) enum Origin {
+    /// The beginning of the step, and this times its velocity.
+    First(Pack),
+    /// The first stage's origin, `before` times the velocity at the beginning, and `first` times that of the first stage.
+    Second {
+        before: Pack,
+        first: Pack,
+        /// Weight of the acceleration at the beginning.
+        weight: f64,
+    },
+}
+
 /// Free flight and the first guess of a stage.
 pub(super) struct Predict<'a> {
     pub(super) motion: &'a mut [Motion],
@@ -137,11 +148,8 @@ pub(super) struct Predict<'a> {
     pub(super) base: &'a mut [[Pack; 3]],
     pub(super) from: &'a mut [[Pack; 3]],
     pub(super) h: f64,
-    pub(super) rest: f64,
-    pub(super) gravity: [f64; 3],
-    pub(super) second: bool,
-    pub(super) cold: bool,
-    pub(super) dt: f64,
+    pub(super) origin: Origin,
+    pub(super) gravity: [Pack; 3],
 }
 
 impl Kernel for Predict<'_> {
@@ -150,29 +158,20 @@ impl Kernel for Predict<'_> {
     fn run<L: Lanes>(self) {
         let h = L::splat(self.h);
         let inverse = L::splat(1.0 / self.h);
-        let rest = L::splat(self.rest);
-        let [x, y, z] = self.gravity;
-        let fall: L3<L> = [L::splat(x), L::splat(y), L::splat(z)];
+        let fall: L3<L> = load3(&self.gravity);
         for (i, m) in self.motion.iter_mut().enumerate() {
-            let x = load3::<L>(&m.x);
             let (vn, an) = (load3::<L>(&m.v), load3::<L>(&m.a));
-            let w = L::splat(self.dt * WEIGHT);
-            let (base, from, a) = if !self.cold && self.second {
-                let (b1, f1) = (load3::<L>(&self.base[i]), load3::<L>(&self.from[i]));
-                let v1 = scale3(sub3(x, b1), inverse);
-                let a1 = scale3(sub3(v1, f1), inverse);
-                let xn = mul_add3(vn, -h, b1);
-                (mul_add3(lanes::add3(vn, v1), w, xn), mul_add3(lanes::add3(an, a1), w, vn), a1)
-            } else if !self.cold {
-                (mul_add3(vn, h, x), mul_add3(an, h, vn), an)
-            } else if self.second {
-                let start = load3::<L>(&self.base[i]);
-                let before = load3::<L>(&self.from[i]);
-                let v = scale3(sub3(x, start), inverse);
-                let a = scale3(sub3(v, before), inverse);
-                (mul_add3(v, rest, start), mul_add3(a, rest, before), a)
-            } else {
-                (x, vn, an)
+            // Accelerations are 0 where they are unknown.
+            let (base, from, a) = match &self.origin {
+                Origin::First(ahead) => (mul_add3(vn, L::load(ahead), load3(&m.x)), mul_add3(an, h, vn), an),
+                Origin::Second { before, first, weight } => {
+                    let (b1, f1) = (load3::<L>(&self.base[i]), load3::<L>(&self.from[i]));
+                    let v1 = scale3(sub3(load3(&m.x), b1), inverse);
+                    let a1 = scale3(sub3(v1, f1), inverse);
+                    let (before, first) = (L::load(before), L::load(first));
+                    let base = mul_add3(v1, first, mul_add3(vn, before, b1));
+                    (base, mul_add3(a1, first, mul_add3(an, L::splat(*weight), vn)), a1)
+                }
             };
             store3(mul_add3(mul_add3(fall, h, from), h, base), &mut self.y[i]);
             store3(mul_add3(mul_add3(a, h, from), h, base), &mut m.x);
