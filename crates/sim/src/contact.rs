@@ -6,7 +6,7 @@
 
 use crate::Vec3;
 use crate::body::Instant;
-use crate::group::Group;
+use crate::group::{Group, lane3};
 use crate::lanes::{LANES, Pack};
 use crate::stage::{Contact, Motion};
 
@@ -139,7 +139,7 @@ pub fn settle(g: &mut Group, contact: &[Contact], lanes: [bool; LANES]) {
                 }
                 continue;
             }
-            let at = |v: &[Pack; 3]| Vec3::new(v[0].0[l], v[1].0[l], v[2].0[l]);
+            let at = |v: &[Pack; 3]| lane3(v, l);
             let n = at(&c.normal);
             let away = n.dot(&(g.v(i, l) - at(&c.velocity))).max(0.0);
             let off = g.x(i, l) - at(&c.anchor);

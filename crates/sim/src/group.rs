@@ -280,13 +280,13 @@ impl Group {
         self.at[lane] = own.clone().map(|i| i as u32).collect();
         for (tip, end) in [settings.root, settings.tip].into_iter().enumerate() {
             let (point, ghost, edge) = if tip == 0 { (before, 0, 0) } else { (before + k - 1, n - 1, n.max(2) - 2) };
-            let from = point_of(&self.motion[point], lane);
+            let (from, beyond) = (self.x(point, lane), self.x(ghost, lane));
             let clamp = &mut self.clamp[lane][tip];
             if end != End::Free {
                 clamp.node.push((point as u32, [0.0; 3]));
             }
             if end == End::Clamped {
-                clamp.node.push((ghost as u32, (point_of(&self.motion[ghost], lane) - from).into()));
+                clamp.node.push((ghost as u32, (beyond - from).into()));
                 clamp.frame = Some((edge as u32, std::array::from_fn(|c| self.motion[edge].m[c].0[lane])));
             }
         }
@@ -294,12 +294,17 @@ impl Group {
 
     /// A node's position.
     pub fn x(&self, i: usize, lane: usize) -> Vec3 {
-        Vec3::new(self.motion[i].x[0].0[lane], self.motion[i].x[1].0[lane], self.motion[i].x[2].0[lane])
+        lane3(&self.motion[i].x, lane)
     }
 
     /// A node's velocity.
     pub fn v(&self, i: usize, lane: usize) -> Vec3 {
-        Vec3::new(self.motion[i].v[0].0[lane], self.motion[i].v[1].0[lane], self.motion[i].v[2].0[lane])
+        lane3(&self.motion[i].v, lane)
+    }
+
+    /// A node's last acceleration, 0 if it is not known.
+    pub fn a(&self, i: usize, lane: usize) -> Vec3 {
+        lane3(&self.motion[i].a, lane)
     }
 
     /// Moves a whole strand rigidly, its velocities and frames along.
@@ -376,8 +381,9 @@ impl Group {
     }
 }
 
-fn point_of(m: &Motion, lane: usize) -> Vec3 {
-    Vec3::new(m.x[0].0[lane], m.x[1].0[lane], m.x[2].0[lane])
+/// A lane of three packs.
+pub fn lane3(p: &[Pack; 3], lane: usize) -> Vec3 {
+    Vec3::new(p[0].0[lane], p[1].0[lane], p[2].0[lane])
 }
 
 /// A mask of lanes as numbers: 1 or 0.

@@ -115,8 +115,9 @@ pub trait Around {
         time: StageTime,
         contact: &mut [Contact],
     ) -> [bool; LANES];
-    /// Fills in the air at the nodes of some lanes; false if it does not act.
-    fn air(&self, group: &Group, lanes: [bool; LANES], fraction: f64, air: &mut [Air]) -> bool;
+    /// Fills in the air at the nodes of some lanes as they will be in the middle of a step, as far as they know; false if it
+    /// does not act.
+    fn air(&self, group: &Group, lanes: [bool; LANES], at: Interval, air: &mut [Air]) -> bool;
 }
 
 /// When a stage is.
@@ -291,7 +292,7 @@ fn step<A: Around>(
     let warm: [bool; LANES] = std::array::from_fn(|l| lanes[l] && !cold[l]);
     let pick = |if_cold: f64, if_warm: f64| Pack(cold.map(|cold| if cold { if_cold } else { if_warm }));
     let carried = pick(1.0 - (1.0 - GAMMA) / GAMMA, -TURN_CARRIED);
-    let blowing = around.air(g, lanes, at.start, &mut work.air);
+    let blowing = around.air(g, lanes, at, &mut work.air);
     for l in (0..LANES).filter(|&l| lanes[l]) {
         work.left.0[l] = 0.0;
     }
@@ -312,7 +313,8 @@ fn step<A: Around>(
         let pulls = reached.map(|r| around.gravity(at.start + r * at.length));
         let gravity = std::array::from_fn(|c| pick(pulls[0][c], pulls[1][c]));
         let Work { y, base, from, .. } = work;
-        lanes::run(method.width, Predict { motion: &mut g.motion, y, base, from, h, origin, gravity });
+        let frames = g.springs.is_none();
+        lanes::run(method.width, Predict { motion: &mut g.motion, y, base, from, h, origin, gravity, frames });
         for (lanes, reached) in [(cold, reached[0]), (warm, reached[1])] {
             if !lanes.contains(&true) {
                 continue;

@@ -347,6 +347,20 @@ fn moved<L: Lanes>(x: L3<L>, d: L3<L>, scale: L) -> L3<L> {
     [L::if_gt(scale, zero, to[0], x[0]), L::if_gt(scale, zero, to[1], x[1]), L::if_gt(scale, zero, to[2], x[2])]
 }
 
+/// A frame's direction after its edge has moved, without a turn about it (parallel transport in time).
+#[inline(always)]
+fn carried<L: Lanes>(from: &Edge<L>, to: &Edge<L>, m: L3<L>) -> L3<L> {
+    let one = L::splat(1.0);
+    let folded = one / (dot(from.t, to.t) + one).max(L::splat(FOLDED));
+    transport(m, from.t, to.t, folded)
+}
+
+/// Carries a frame along with its edge.
+#[inline(always)]
+pub fn carry<L: Lanes>(from: &Edge<L>, to: &Edge<L>, m: &mut [Pack; 3]) {
+    store3(carried(from, to, load3(m)), m);
+}
+
 /// Moves the nodes and frames by the solution, no segment by more than [`LARGEST_TURN`]; returns the square of the
 /// largest movement over the edge's length.
 #[inline(always)]
@@ -386,8 +400,7 @@ pub fn apply<L: Lanes, const D: usize, const ROWS: usize>(
         store3(new_next, &mut motion[j].x);
         if D == 4 {
             let (e0, e1) = (edge(old, old_next), edge(new, new_next));
-            let folded = one / (dot(e0.t, e1.t) + one).max(L::splat(FOLDED));
-            let m = transport(load3(&motion[j - 1].m), e0.t, e1.t, folded);
+            let m = carried(&e0, &e1, load3(&motion[j - 1].m));
             let turn = L::if_gt(scale, zero, L::load(&scratch.rhs[j - 1][3]) * scale, zero);
             (L::load(&turned[j - 1]) + turn).store(&mut turned[j - 1]);
             // Cayley's rotation: an exact rotation by almost `turn`.

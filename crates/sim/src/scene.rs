@@ -3,7 +3,7 @@
 use crate::contact;
 use crate::drag;
 use crate::group::Group;
-use crate::integrate::{Around, StageTime};
+use crate::integrate::{Around, Interval, StageTime};
 use crate::lanes::{LANES, Pack};
 use crate::settings::{End, Settings};
 use crate::simulation::{Root, SHORTEST, Span};
@@ -125,11 +125,12 @@ impl Around for Scene<'_> {
         contact::find(g, start, &self.span.body.at(time.fraction), lanes, time.h, time.elapsed, contact)
     }
 
-    fn air(&self, g: &Group, lanes: [bool; LANES], fraction: f64, air: &mut [Air]) -> bool {
+    fn air(&self, g: &Group, lanes: [bool; LANES], at: Interval, air: &mut [Air]) -> bool {
         let factor = self.settings.material.drag_factor;
         if factor == 0.0 {
             return false;
         }
+        let (fraction, ahead) = (at.start + 0.5 * at.length, 0.5 * at.length * at.span);
         let time = self.span.time + fraction * self.span.seconds;
         let still = drag::Air::default();
         let wind = self.span.wind.map(|[a, b]| Wind::lerp(a, b, fraction));
@@ -140,7 +141,7 @@ impl Around for Scene<'_> {
             let at = &g.at[l];
             let n = at.len();
             point.clear();
-            point.extend(at.iter().map(|&i| g.x(i as usize, l)));
+            point.extend(at.iter().map(|&i| g.x(i as usize, l) + g.v(i as usize, l) * ahead));
             if let Some(wind) = &wind {
                 wind.free_along(&point, WIND_STRIDE, time, &mut blowing[..n]);
                 if let Some(body) = body.as_ref().filter(|_| wind.boundary > 0.0) {
@@ -160,7 +161,7 @@ impl Around for Scene<'_> {
                 let share = g.node[i].share.0[l];
                 let e = point[(k + 1).min(n - 1)] - point[k.saturating_sub(1)];
                 let t = e.try_normalize(SHORTEST).unwrap_or(Vec3::zeros());
-                let u = g.v(i, l) - blowing[k];
+                let u = g.v(i, l) + g.a(i, l) * ahead - blowing[k];
                 let along = t.dot(&u);
                 let across = (u - t * along).norm();
                 let d = drag::drag(&still, self.settings.material.diameter, length, across, along.abs());

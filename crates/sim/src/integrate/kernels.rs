@@ -2,6 +2,7 @@
 
 use crate::band::{self, Panel, RING, Window};
 use crate::group::Group;
+use crate::hinge::edge;
 use crate::lanes::{Kernel, L3, LANES, Lanes, Pack, load3, mul_add3, scale3, store3, sub3};
 use crate::rod::{self, Damping, Scratch, Watch};
 use crate::springs::kernel;
@@ -150,6 +151,8 @@ pub(super) struct Predict<'a> {
     pub(super) h: f64,
     pub(super) origin: Origin,
     pub(super) gravity: [Pack; 3],
+    /// Whether edges have frames.
+    pub(super) frames: bool,
 }
 
 impl Kernel for Predict<'_> {
@@ -159,14 +162,18 @@ impl Kernel for Predict<'_> {
         let h = L::splat(self.h);
         let inverse = L::splat(1.0 / self.h);
         let fall: L3<L> = load3(&self.gravity);
-        for (i, m) in self.motion.iter_mut().enumerate() {
+        // Where the node behind was, and is now.
+        let mut behind: Option<(L3<L>, L3<L>)> = None;
+        for i in 0..self.motion.len() {
+            let m = &mut self.motion[i];
+            let old = load3::<L>(&m.x);
             let (vn, an) = (load3::<L>(&m.v), load3::<L>(&m.a));
             // Accelerations are 0 where they are unknown.
             let (base, from, a) = match &self.origin {
-                Origin::First(ahead) => (mul_add3(vn, L::load(ahead), load3(&m.x)), mul_add3(an, h, vn), an),
+                Origin::First(ahead) => (mul_add3(vn, L::load(ahead), old), mul_add3(an, h, vn), an),
                 Origin::Second { before, first, weight } => {
                     let (b1, f1) = (load3::<L>(&self.base[i]), load3::<L>(&self.from[i]));
-                    let v1 = scale3(sub3(load3(&m.x), b1), inverse);
+                    let v1 = scale3(sub3(old, b1), inverse);
                     let a1 = scale3(sub3(v1, f1), inverse);
                     let (before, first) = (L::load(before), L::load(first));
                     let base = mul_add3(v1, first, mul_add3(vn, before, b1));
@@ -174,9 +181,14 @@ impl Kernel for Predict<'_> {
                 }
             };
             store3(mul_add3(mul_add3(fall, h, from), h, base), &mut self.y[i]);
-            store3(mul_add3(mul_add3(a, h, from), h, base), &mut m.x);
+            let new = mul_add3(mul_add3(a, h, from), h, base);
+            store3(new, &mut m.x);
             store3(base, &mut self.base[i]);
             store3(from, &mut self.from[i]);
+            if let (true, Some((was, is))) = (self.frames, behind) {
+                rod::carry(&edge(was, old), &edge(is, new), &mut self.motion[i - 1].m);
+            }
+            behind = Some((old, new));
         }
     }
 }
