@@ -357,7 +357,7 @@ fn carried<L: Lanes>(from: &Edge<L>, to: &Edge<L>, m: L3<L>) -> L3<L> {
 
 /// Carries a frame along with its edge.
 #[inline(always)]
-pub fn carry<L: Lanes>(from: &Edge<L>, to: &Edge<L>, m: &mut [Pack; 3]) {
+pub(crate) fn carry<L: Lanes>(from: &Edge<L>, to: &Edge<L>, m: &mut [Pack; 3]) {
     store3(carried(from, to, load3(m)), m);
 }
 
