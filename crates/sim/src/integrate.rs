@@ -33,7 +33,7 @@ const TURN_CARRIED: f64 = 0.207_106_781_186_547_5;
 /// of that strand only.
 const SHORTEST_STEP: f64 = 1.6e-4;
 
-/// A step of the deepest level whose iterations still turn an edge by this, radians, has diverged: the strand is held.
+/// A step of the deepest level whose iterations still turn an edge by this, radians, says nothing of speed: it is taken away.
 const LOOSE: f64 = 0.1;
 
 /// Iterations of a stage before its step is halved.
@@ -140,6 +140,8 @@ pub struct Done {
     pub node_solves: u64,
     /// Depth of the deepest halving, per lane.
     pub deepest: [u8; LANES],
+    /// Lanes whose motion could not be followed: it was stopped, and went on from rest.
+    pub stopped: [bool; LANES],
     /// Lanes that diverged.
     pub failed: [bool; LANES],
     /// Largest strain at the end of a step, per lane.
@@ -183,13 +185,18 @@ pub fn advance<A: Around>(
             let finite = seen.finite.0[l] == 0.0;
             let calm = converged[l] && finite && seen.turn.0[l] <= method.largest_turn * method.largest_turn;
             let settled = converged[l] || work.left.0[l] < LOOSE;
-            if now[l] && (calm || (last && finite && settled)) {
+            if now[l] && (calm || (last && finite)) {
                 done.deepest[l] = done.deepest[l].max(depth);
                 done.strain[l] = seen.strain.0[l];
                 if seen.strain.0[l] > method.strain_limit && g.springs.is_none() {
                     limit_strain(g, l, method.strain_limit, at.length * at.span);
                     g.forget_acceleration(l);
                     done.strain[l] = method.strain_limit;
+                }
+                if !calm && !settled {
+                    // What can't be followed in the shortest step goes on from rest: folds open, heaps spread.
+                    g.stop(l);
+                    done.stopped[l] = true;
                 }
                 done.speed[l] = seen.speed.0[l].sqrt();
                 // Half the turn would have been fine with twice the step.

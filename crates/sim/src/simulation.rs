@@ -105,6 +105,8 @@ pub struct SpanReport {
     pub deepest: f64,
     /// Strands carried over a jump of their root.
     pub teleported: u64,
+    /// Strands whose motion could not be followed in the shortest steps: they were stopped, and went on from rest.
+    pub stopped: Vec<StrandId>,
     /// Strands that diverged and were held for this span.
     pub held: Vec<StrandId>,
     /// Strands whose root was not a number: held where it was last.
@@ -302,10 +304,13 @@ impl Simulation {
                 report.shortest_step = report.shortest_step.min(short);
                 if d.failed[l] {
                     report.held.push(self.id[s]);
+                } else if d.stopped[l] {
+                    report.stopped.push(self.id[s]);
                 }
             }
         }
         report.held.sort_unstable();
+        report.stopped.sort_unstable();
         let last = scene.all_roots();
         for (s, root) in last.iter().enumerate() {
             match root {

@@ -411,7 +411,6 @@ fn nothing_to_do_and_stopping() {
 static EMPTY: Body<'static> = Body { parts: Vec::new(), seconds: FRAME };
 
 #[test]
-#[ignore = "a strand folded flat onto itself is held, and does not open again"]
 fn soft_hair_crushed_together_spreads_again() {
     // Straight hair in a heap: every segment folded back, then let go.
     let n = 16;

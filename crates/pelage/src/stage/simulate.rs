@@ -519,7 +519,12 @@ fn note(run: &mut Runner<'_>, layer: &str, frame: i64, r: &SpanReport, counts: &
     most("largest strain, millionths", (r.largest_strain * 1e6).round() as u64);
     let values = [r.particle_steps, r.teleported, r.held.len() as u64, r.bad_roots.len() as u64];
     SUMMED.into_iter().zip(values).for_each(|(name, n)| *counts.entry(name.to_owned()).or_default() += n);
-    for (ids, what) in [(&r.held, "strands diverged and were held"), (&r.bad_roots, "roots are not numbers: held")] {
+    let odd = [
+        (&r.stopped, "strands moved too violently to be followed and were stopped"),
+        (&r.held, "strands diverged and were held"),
+        (&r.bad_roots, "roots are not numbers: held"),
+    ];
+    for (ids, what) in odd {
         if !ids.is_empty() {
             run.warnings.push(format!("layer {layer}, frame {frame}: {} {what}: {}", ids.len(), list(ids)));
         }
