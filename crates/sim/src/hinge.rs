@@ -119,14 +119,21 @@ pub(crate) fn moment<L: Lanes>(e: [&Edge<L>; 2], m: [L3<L>; 2], h: &Hinge<L>, fo
     let [f1, f2, f3] = force;
     // Half of the moment, in each edge's frame, as long as both halves make it.
     let longer = L::splat(0.5) * h.longer;
-    let part = |e: &Edge<L>, m: L3<L>| scale3(neg_mul_add3(m, f2, scale3(cross(e.t, m), f1)), longer);
+    let n0 = scale3(neg_mul_add3(m[0], f2, scale3(cross(e[0].t, m[0]), f1)), longer);
+    let n1 = scale3(neg_mul_add3(m[1], f2, scale3(cross(e[1].t, m[1]), f1)), longer);
     let bending = f1.mul_add(h.value[0], f2 * h.value[1]);
     Moment {
-        n: [part(e[0], m[0]), part(e[1], m[1])],
+        n: [n0, n1],
         torque: f3.mul_add(h.turn[2][1], h.grows * bending),
         torque_grows: bending * (h.grows + h.grows).mul_add(h.grows, L::splat(0.25)),
         grows: h.grows,
     }
+}
+
+/// An entry of `a b^T + b a^T + to`.
+#[inline(always)]
+fn both<L: Lanes>(a: L3<L>, b: L3<L>, x: usize, y: usize, to: L) -> L {
+    a[x].mul_add(b[y], b[x].mul_add(a[y], to))
 }
 
 /// What the moments add to the tangent: the second derivative by both edges of `kappa . sigma`, sigma the bending moment
@@ -157,34 +164,35 @@ pub(crate) fn second<L: Lanes>(e0: &Edge<L>, e1: &Edge<L>, sigma: L3<L>, moment:
     let (u0, w1) = (neg_mul_add3(t0, half * along, u), neg_mul_add3(t1, half * along, w));
     let (mut left, mut s) = (p0, scale3(sigma, -g));
     let binormal = cross(t0, t1);
-    let frames = moment.map(|m| {
+    // No closures here: one that is not inlined is compiled without wide registers.
+    let mut frames = None;
+    if let Some(m) = moment {
         let (torque, grows) = (m.torque * folded, m.grows * folded);
         let more = scale3(binormal, half * m.torque_grows * folded * folded);
         let (u, w) = (mul_add3(u, grows, more), mul_add3(w, grows, more));
-        let both = scale3(add3(t0, t1), folded);
+        let sum = scale3(add3(t0, t1), folded);
         let (n, g, torque_half) = (m.n, half * g, half * torque);
         left = neg_mul_add3(binormal, torque * folded, left);
         s = mul_add3(t0, torque, s);
-        let a = mul_add3(n[0], g, neg_mul_add3(add3(t0, both), torque_half, u));
-        let b = mul_add3(n[1], g, neg_mul_add3(add3(t1, both), torque_half, w));
-        (a, u, w, b)
-    });
+        let a = mul_add3(n[0], g, neg_mul_add3(add3(t0, sum), torque_half, u));
+        let b = mul_add3(n[1], g, neg_mul_add3(add3(t1, sum), torque_half, w));
+        frames = Some((a, u, w, b));
+    }
     // The star of s across both edges, and the identity.
     let ahead = neg_mul_add3(t1, along, mul_add3(t0, bend, cross(t0, s)));
     let behind = mul_add3(t1, bend, cross(s, t1));
     let star = [[bend, -s[2], s[1]], [s[2], bend, -s[0]], [-s[1], s[0], bend]];
     let (i00, i01, i11) = (e0.inverse * e0.inverse, e0.inverse * e1.inverse, e1.inverse * e1.inverse);
     let mut out = Blocks { aa: [[zero; 3]; 3], ab: [[zero; 3]; 3], bb: [[zero; 3]; 3] };
-    let twice = |a: L3<L>, b: L3<L>, x: usize, y: usize, to: L| a[x].mul_add(b[y], b[x].mul_add(a[y], to));
-    let less_twice = |a: L3<L>, b: L3<L>, x: usize, y: usize, to: L| a[x].neg_mul_add(b[y], b[x].neg_mul_add(a[y], to));
     for x in 0..3 {
         for y in 0..3 {
             if y <= x {
                 let start = if x == y { -along } else { zero };
-                let mut a = twice(p, p0, x, y, less_twice(t0, u0, x, y, start));
-                let mut b = twice(r, r1, x, y, less_twice(t1, w1, x, y, start));
+                let mut a = t0[x].neg_mul_add(u0[y], u0[x].neg_mul_add(t0[y], start));
+                let mut b = t1[x].neg_mul_add(w1[y], w1[x].neg_mul_add(t1[y], start));
+                (a, b) = (both(p, p0, x, y, a), both(r, r1, x, y, b));
                 if let Some((m, _, _, n)) = frames {
-                    (a, b) = (twice(binormal, m, x, y, a), twice(binormal, n, x, y, b));
+                    (a, b) = (both(binormal, m, x, y, a), both(binormal, n, x, y, b));
                 }
                 (out.aa[x][y], out.bb[x][y]) = (a * i00, b * i11);
                 (out.aa[y][x], out.bb[y][x]) = (out.aa[x][y], out.bb[x][y]);
