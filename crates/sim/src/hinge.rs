@@ -86,7 +86,14 @@ pub(crate) fn straight_hinge<L: Lanes>(e0: &Edge<L>, e1: &Edge<L>) -> Hinge<L> {
     let (zero, one) = (L::splat(0.0), L::splat(1.0));
     let c = dot(e0.t, e1.t);
     let factor = angle_factor(c);
-    let mut h = Hinge { value: [zero; 3], a: [[zero; 3]; 3], b: [[zero; 3]; 3], turn: [[zero; 2]; 3], longer: one, grows: zero };
+    let mut h = Hinge {
+        value: [zero; 3],
+        a: [[zero; 3]; 3],
+        b: [[zero; 3]; 3],
+        turn: [[zero; 2]; 3],
+        longer: one,
+        grows: zero,
+    };
     for k in 0..3 {
         let mut d = [zero; 3];
         d[k] = one;
