@@ -148,7 +148,7 @@ fn both<L: Lanes>(a: L3<L>, b: L3<L>, x: usize, y: usize, to: L) -> L {
 /// error in groomed hair, with it a hundredth.
 ///
 /// The angle's gradients are `b / |e0|` and `b / |e1|`, b = t0 x t1 / (1 + c). Its second derivatives (M. Bergou et al.,
-/// "Discrete Viscous Threads", 2010, section 4.2) are `-(b s^T + s b^T) / (2 |e0|^2)`, s = t0 + (t0 + t1) / (1 + c), for the
+/// "Discrete Viscous Threads", 2010) are `-(b s^T + s b^T) / (2 |e0|^2)`, s = t0 + (t0 + t1) / (1 + c), for the
 /// first edge, so for the second, and `([t0]x (1 - t1 t1^T) - b r^T) / (1 + c) / (|e0| |e1|)`, r = t0 - c t1, for both. They
 /// have the form of those of curvature and go into the same products.
 #[inline(always)]

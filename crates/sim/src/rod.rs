@@ -10,8 +10,9 @@
 //! and still grows without bound as an edge folds back. It is measured in the frame half-way between those of the two
 //! edges. The twist `m` is the angle between frames after parallel transport, measured in the same way.
 //!
-//! The tangent matrix is Gauss-Newton (a sum of squares, hence positive semidefinite) plus the positive part of the
-//! geometric stiffness of stretched edges. Twist has no inertia worth a step: it is solved along with the positions, and
+//! The tangent matrix is Gauss-Newton (a sum of squares, hence positive semidefinite) plus what the moments add, which may
+//! be indefinite (inertia outweighs it, or the step is halved), plus the positive part of the geometric stiffness of
+//! stretched edges. Twist has no inertia worth a step: it is solved along with the positions, and
 //! frames are carried in time by parallel transport plus that turn.
 
 use crate::band::{self, Column, RING, Window};

@@ -49,9 +49,10 @@ fn energy(shot: &Shot, settings: &Settings, clamp: Option<Vec3>) -> f64 {
 
 #[test]
 fn energy_does_not_grow_without_forcing() {
-    // 1e5 steps of hair released from rest, solved to the last digits that count.
+    // 1e5 steps of hair released from rest, at the default tolerance.
     for model in MODELS {
-        for (gamma, n, dt, tolerance) in [(10.0, 6, 1.0 / 192.0, 1e-9)] {
+        for (gamma, n, dt) in [(10.0, 6, 1.0 / 192.0), (10.0, 20, 1.0 / 192.0)] {
+            let tolerance = Settings::default().tolerance;
             let settings = Settings { substeps: Some(50), tolerance, ..plain(model, rod(gamma)) };
             let mut shot = Shot::new(&[straight(n, Vec3::x())], &settings, GRAVITY);
             let first = energy(&shot, &settings, Some(Vec3::x()));
