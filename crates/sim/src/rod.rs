@@ -12,7 +12,7 @@
 //!
 //! The tangent matrix is Gauss-Newton (a sum of squares, hence positive semidefinite) plus what the moments add, which may
 //! be indefinite (inertia outweighs it, or the step is halved), plus the positive part of the geometric stiffness of
-//! stretched edges. Twist has no inertia worth a step: it is solved along with the positions, and
+//! stretched edges. Twist has no inertia worth a step: it is solved along with the positions, in balance, and
 //! frames are carried in time by parallel transport plus that turn.
 
 use crate::band::{self, Column, RING, Window};
@@ -31,7 +31,7 @@ pub struct Elastic {
     pub twist: Pack,
     /// Natural curvature in both material directions, radians, and natural twist, radians.
     pub rest: [Pack; 3],
-    /// Rotational inertia of the edge about its axis, kilogram square metres.
+    /// Rotational inertia of the edge about its axis, kilogram square metres: bounds turns in the tangent alone.
     pub spin: Pack,
 }
 
@@ -253,11 +253,11 @@ pub fn sweep<L: Lanes, const D: usize, const ROWS: usize>(
     let spin_scale = L::splat(1.0 / (stage.h * stage.h));
     let mut before: Option<Edge<L>> = None;
     let mut here = edge::<L>(load3(&motion[0].x), load3(&motion[1].x));
-    open_turn::<L, D, ROWS>(0, nodes, elastic, turned, motion, stage, &mut window, rhs, spin_scale);
+    open_turn::<L, D, ROWS>(0, nodes, elastic, motion, stage, &mut window, rhs, spin_scale);
     for i in 0..n {
         if i + 1 < n {
             let next = if i + 2 < n { edge::<L>(load3(&motion[i + 1].x), load3(&motion[i + 2].x)) } else { here };
-            open_turn::<L, D, ROWS>(i + 1, nodes, elastic, turned, motion, stage, &mut window, rhs, spin_scale);
+            open_turn::<L, D, ROWS>(i + 1, nodes, elastic, motion, stage, &mut window, rhs, spin_scale);
             add_edge(i, &here, L::load(&nodes[i].length), L::load(&elastic[i].stretch), &mut window, rhs);
             if let Some(e0) = &before {
                 let e = &elastic[i];
@@ -309,13 +309,15 @@ fn change<L: Lanes>(j: usize, motion: &[Motion], stage: &Stage<'_>) -> L3<L> {
     sub3(load3(&motion[j].x), load3(&stage.base[j]))
 }
 
+/// Opens a node's panel and that of the turn of the edge behind it. Inertia about the axis only bounds a turn that nothing
+/// resists. Its torque is left out: a turn counts from the parallel frame, which is no inertial one, so free hair would be
+/// braked from outside (a hundredth of its angular momentum in half a second).
 #[allow(clippy::too_many_arguments)]
 #[inline(always)]
 fn open_turn<L: Lanes, const D: usize, const ROWS: usize>(
     j: usize,
     nodes: &[Node],
     elastic: &[Elastic],
-    turned: &[Pack],
     motion: &[Motion],
     stage: &mut Stage<'_>,
     window: &mut Window<L, D, ROWS>,
@@ -326,7 +328,6 @@ fn open_turn<L: Lanes, const D: usize, const ROWS: usize>(
     if D == 4 {
         let spin = L::load(&elastic[j].spin) * spin_scale;
         window[j % RING].0[3][3] = spin + L::load(&nodes[j].held_turn);
-        (-(spin * L::load(&turned[j]))).store(&mut rhs[j][3]);
     }
 }
 

@@ -132,8 +132,8 @@ fn a_free_strand_keeps_its_momentum() {
             }
             if model == Model::Rod {
                 println!("  angular momentum {turned:?}");
-                // Measured, not what it should be: of second order in the step.
-                assert!(turned.iter().all(|t| *t < 1e-2), "{turned:?}");
+                // Of second order in the step, down to what pins leave.
+                assert!(turned[0] < 1e-4 && (turned[0] < 1e-6 || turned[2] < turned[0] / 12.0), "{turned:?}");
             }
         }
     }
@@ -161,7 +161,7 @@ fn internal_forces_have_no_sum_and_no_torque() {
                 l.norm() / size,
                 shot.fastest()
             );
-            assert!(shot.fastest() > 1e-2 && p.norm() < 1e-11 * size && l.norm() < 1e-3 * size);
+            assert!(shot.fastest() > 1e-2 && p.norm() < 1e-11 * size && l.norm() < 1e-4 * size);
         }
     }
 }
