@@ -10,12 +10,13 @@
 //! and still grows without bound as an edge folds back. It is measured in the frame half-way between those of the two
 //! edges. The twist `m` is the angle between frames after parallel transport, measured in the same way.
 //!
-//! The tangent matrix is Gauss-Newton (a sum of squares, hence positive semidefinite) plus the positive part of the
-//! geometric stiffness of stretched edges. Twist has no inertia worth a step: it is solved along with the positions, and
+//! The tangent matrix is Gauss-Newton (a sum of squares, hence positive semidefinite) plus what the moments add, which may
+//! be indefinite (inertia outweighs it, or the step is halved), plus the positive part of the geometric stiffness of
+//! stretched edges. Twist has no inertia worth a step: it is solved along with the positions, in balance, and
 //! frames are carried in time by parallel transport plus that turn.
 
 use crate::band::{self, Column, RING, Window};
-use crate::hinge::{Blocks, Edge, FOLDED, Hinge, bend_second, edge, straight_hinge, transport, twisting_hinge};
+use crate::hinge::{Blocks, Edge, FOLDED, Hinge, edge, moment, second, straight_hinge, transport, twisting_hinge};
 use crate::lanes::{L3, Lanes, Pack, add3, cross, dot, load3, mul_add3, neg_mul_add3, scale3, store3, sub3};
 use crate::stage::{LARGEST_TURN, Motion, Node, Stage, open_node};
 
@@ -30,7 +31,7 @@ pub struct Elastic {
     pub twist: Pack,
     /// Natural curvature in both material directions, radians, and natural twist, radians.
     pub rest: [Pack; 3],
-    /// Rotational inertia of the edge about its axis, kilogram square metres.
+    /// Rotational inertia of the edge about its axis, kilogram square metres: bounds turns in the tangent alone.
     pub spin: Pack,
 }
 
@@ -252,11 +253,11 @@ pub fn sweep<L: Lanes, const D: usize, const ROWS: usize>(
     let spin_scale = L::splat(1.0 / (stage.h * stage.h));
     let mut before: Option<Edge<L>> = None;
     let mut here = edge::<L>(load3(&motion[0].x), load3(&motion[1].x));
-    open_turn::<L, D, ROWS>(0, nodes, elastic, turned, motion, stage, &mut window, rhs, spin_scale);
+    open_turn::<L, D, ROWS>(0, nodes, elastic, motion, stage, &mut window, rhs, spin_scale);
     for i in 0..n {
         if i + 1 < n {
             let next = if i + 2 < n { edge::<L>(load3(&motion[i + 1].x), load3(&motion[i + 2].x)) } else { here };
-            open_turn::<L, D, ROWS>(i + 1, nodes, elastic, turned, motion, stage, &mut window, rhs, spin_scale);
+            open_turn::<L, D, ROWS>(i + 1, nodes, elastic, motion, stage, &mut window, rhs, spin_scale);
             add_edge(i, &here, L::load(&nodes[i].length), L::load(&elastic[i].stretch), &mut window, rhs);
             if let Some(e0) = &before {
                 let e = &elastic[i];
@@ -282,16 +283,11 @@ pub fn sweep<L: Lanes, const D: usize, const ROWS: usize>(
                     w.damped[q] = w.k[q] * damp;
                 }
                 let second = if D == 4 {
-                    let [f1, f2, _] = w.force;
-                    let (m0, m1) = (load3::<L>(&motion[i - 1].m), load3::<L>(&motion[i].m));
-                    // Half of the moment, in each edge's frame, as long as both halves make it.
-                    let longer = L::splat(0.5) * h.longer;
-                    let n0 = scale3(neg_mul_add3(m0, f2, scale3(cross(e0.t, m0), f1)), longer);
-                    let n1 = scale3(neg_mul_add3(m1, f2, scale3(cross(here.t, m1), f1)), longer);
-                    bend_second(e0, &here, add3(n0, n1), n0, n1)
+                    let m = [load3::<L>(&motion[i - 1].m), load3::<L>(&motion[i].m)];
+                    let moment = moment([e0, &here], m, &h, w.force);
+                    second(e0, &here, add3(moment.n[0], moment.n[1]), Some(moment))
                 } else {
-                    let none = [zero; 3];
-                    bend_second(e0, &here, w.force, none, none)
+                    second(e0, &here, w.force, None)
                 };
                 add_hinge(i, &h, &w, second, &mut window, rhs);
             }
@@ -313,13 +309,15 @@ fn change<L: Lanes>(j: usize, motion: &[Motion], stage: &Stage<'_>) -> L3<L> {
     sub3(load3(&motion[j].x), load3(&stage.base[j]))
 }
 
+/// Opens a node's panel and that of the turn of the edge behind it. Inertia about the axis only bounds a turn that nothing
+/// resists. Its torque is left out: a turn counts from the parallel frame, which is no inertial one, so free hair would be
+/// braked from outside (a hundredth of its angular momentum in half a second).
 #[allow(clippy::too_many_arguments)]
 #[inline(always)]
 fn open_turn<L: Lanes, const D: usize, const ROWS: usize>(
     j: usize,
     nodes: &[Node],
     elastic: &[Elastic],
-    turned: &[Pack],
     motion: &[Motion],
     stage: &mut Stage<'_>,
     window: &mut Window<L, D, ROWS>,
@@ -330,7 +328,6 @@ fn open_turn<L: Lanes, const D: usize, const ROWS: usize>(
     if D == 4 {
         let spin = L::load(&elastic[j].spin) * spin_scale;
         window[j % RING].0[3][3] = spin + L::load(&nodes[j].held_turn);
-        (-(spin * L::load(&turned[j]))).store(&mut rhs[j][3]);
     }
 }
 
@@ -536,4 +533,121 @@ pub fn watch<L: Lanes>(nodes: &[Node], elastic: &[Elastic], before: &[Motion], a
     strain.store(&mut out.strain);
     speed.store(&mut out.speed);
     finite.store(&mut out.finite);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hinge::moved_frame;
+    use crate::lanes::Plain;
+    use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+
+    const H: f64 = 0.1;
+    const MASS: f64 = 1.0;
+
+    /// Two edges, bent and twisted away from their natural shape and stretched a little.
+    fn elastic(bend: f64, twist: f64) -> (Vec<Node>, Vec<Elastic>) {
+        let (mass, spin) = (Pack::splat(MASS), Pack::splat(MASS));
+        let nodes = [1.1, 1.0, 0.0].map(|l| Node { mass, length: Pack::splat(l), ..Node::default() });
+        let stretch = Pack::splat(3.0);
+        let end = Elastic { stretch, spin, ..Elastic::default() };
+        let rest = [0.05, -0.1, 0.03].map(Pack::splat);
+        let hinge = Elastic { bend: Pack::splat(bend), twist: Pack::splat(twist), rest, ..end };
+        (nodes.to_vec(), vec![end, hinge, end])
+    }
+
+    /// Three nodes and two turns moved by `d` from a bent pose with `twist` between the frames, in radians.
+    fn pose(twist: f64, d: &DVector<f64>) -> Vec<Motion> {
+        let x = [[0.0, 0.0, 0.0], [1.1, 0.2, -0.1], [1.9, 0.9, 0.3]];
+        let at = |k: usize| -> [f64; 3] { std::array::from_fn(|c| x[k][c] + d[4 * k + c]) };
+        (0..3)
+            .map(|k| {
+                let mut m = Motion { x: at(k).map(Pack::splat), ..Motion::default() };
+                if k < 2 {
+                    let turn = d[4 * k + 3] + if k == 1 { twist } else { 0.0 };
+                    let frame = moved_frame([x[k], x[k + 1]], [at(k), at(k + 1)], [0.1, 1.0, 0.4], turn);
+                    store3(frame, &mut m.m);
+                }
+                m
+            })
+            .collect()
+    }
+
+    /// The gradient at `motion`, and if asked for the tangent, inertia left out.
+    fn assembled(model: &(Vec<Node>, Vec<Elastic>), motion: &[Motion], tangent: bool) -> (DVector<f64>, DMatrix<f64>) {
+        let mut scratch = Scratch::<4, 11>::default();
+        scratch.reserve(3);
+        let at: Vec<[Pack; 3]> = motion.iter().map(|m| m.x).collect();
+        let turned = [Pack::default(); 3];
+        let mut run = |eliminate: bool| {
+            let mut stage = Stage {
+                h: H,
+                y: &at,
+                base: &at,
+                contact: None,
+                friction: 0.0,
+                refresh: false,
+                solved: true,
+                air: None,
+                active: Pack::splat(1.0),
+            };
+            let damping = Damping(0.0);
+            sweep::<Plain, 4, 11>(&model.0, &model.1, motion, &turned, damping, &mut stage, &mut scratch, eliminate);
+            scratch.clone()
+        };
+        let rhs = run(false).rhs;
+        let gradient = DVector::from_fn(12, |i, _| -rhs[i / 4][i % 4].0[0]);
+        if !tangent {
+            return (gradient, DMatrix::zeros(0, 0));
+        }
+        let factor = run(true).factor;
+        let entry = |r: usize, c: usize| factor[c / 4][r - c / 4 * 4][c % 4].0[0];
+        let lower = DMatrix::from_fn(12, 12, |r, c| match r {
+            _ if r == c => 1.0,
+            _ if r > c && r - c / 4 * 4 < 11 => entry(r, c),
+            _ => 0.0,
+        });
+        let pivots = DMatrix::from_diagonal(&DVector::from_fn(12, |i, _| 1.0 / entry(i, i)));
+        assert!((0..12).all(|i| pivots[(i, i)] > 0.0));
+        (gradient, &lower * pivots * lower.transpose() - DMatrix::identity(12, 12) * (MASS / (H * H)))
+    }
+
+    #[test]
+    fn the_tangent_is_the_gradients_finite_difference() {
+        for (twist, bend, stiff, bound) in
+            [(0.1, 1.0, 0.0, 1e-8), (0.1, 0.8, 0.7, 1e-5), (0.8, 1.0, 0.0, 1e-8), (0.8, 0.8, 0.7, 2e-3)]
+        {
+            let model = elastic(bend, stiff);
+            let none = DVector::zeros(12);
+            let motion = pose(twist, &none);
+            let (gradient, tangent) = assembled(&model, &motion, true);
+            let e = 1e-5;
+            let mut difference = DMatrix::zeros(12, 12);
+            for q in 0..12 {
+                let shifted = |s: f64| {
+                    let mut d = none.clone();
+                    d[q] = s;
+                    assembled(&model, &pose(twist, &d), false).0
+                };
+                difference.set_column(q, &((shifted(e) - shifted(-e)) / (2.0 * e)));
+            }
+            // Frames carried in parallel come back turned: the difference is not symmetric where an edge's turn is not in
+            // balance. Its antisymmetric part is T / (2 |e|^2) [t]x by the edge, T the derivative by its turn.
+            for i in 0..2 {
+                let p = |k: usize| Vector3::from_fn(|c, _| motion[k].x[c].0[0]);
+                let edge = p(i + 1) - p(i);
+                let length = edge.norm();
+                let by_edge: Matrix3<f64> =
+                    (edge / length).cross_matrix() * (gradient[4 * i + 3] / (2.0 * length * length));
+                for (r, c, sign) in [(i, i, 1.0), (i + 1, i + 1, 1.0), (i, i + 1, -1.0), (i + 1, i, -1.0)] {
+                    let mut block = difference.fixed_view_mut::<3, 3>(4 * r, 4 * c);
+                    block -= by_edge * sign;
+                }
+            }
+            let off = (&tangent - &difference).amax();
+            println!("twist {twist} bend {bend} {stiff}: {off:.1e} of {:.1}", difference.amax());
+            // All of bending; of twisting, what is left out is how its measure departs from the angle.
+            assert!(off < bound && difference.amax() > 1.0 && gradient.amax() > 0.1);
+        }
+    }
 }

@@ -49,9 +49,10 @@ fn energy(shot: &Shot, settings: &Settings, clamp: Option<Vec3>) -> f64 {
 
 #[test]
 fn energy_does_not_grow_without_forcing() {
-    // 1e5 steps of hair released from rest, solved to the last digits that count.
+    // 1e5 steps of hair released from rest, at the default tolerance.
     for model in MODELS {
-        for (gamma, n, dt, tolerance) in [(10.0, 6, 1.0 / 192.0, 1e-9)] {
+        for (gamma, n, dt) in [(10.0, 6, 1.0 / 192.0), (10.0, 20, 1.0 / 192.0)] {
+            let tolerance = Settings::default().tolerance;
             let settings = Settings { substeps: Some(50), tolerance, ..plain(model, rod(gamma)) };
             let mut shot = Shot::new(&[straight(n, Vec3::x())], &settings, GRAVITY);
             let first = energy(&shot, &settings, Some(Vec3::x()));
@@ -131,8 +132,8 @@ fn a_free_strand_keeps_its_momentum() {
             }
             if model == Model::Rod {
                 println!("  angular momentum {turned:?}");
-                // Measured, not what it should be: of second order in the step.
-                assert!(turned.iter().all(|t| *t < 1e-2), "{turned:?}");
+                // Of second order in the step, down to what pins leave.
+                assert!(turned[0] < 1e-4 && (turned[0] < 1e-6 || turned[2] < turned[0] / 12.0), "{turned:?}");
             }
         }
     }
@@ -160,7 +161,7 @@ fn internal_forces_have_no_sum_and_no_torque() {
                 l.norm() / size,
                 shot.fastest()
             );
-            assert!(shot.fastest() > 1e-2 && p.norm() < 1e-11 * size && l.norm() < 1e-3 * size);
+            assert!(shot.fastest() > 1e-2 && p.norm() < 1e-11 * size && l.norm() < 1e-4 * size);
         }
     }
 }

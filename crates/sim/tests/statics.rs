@@ -5,8 +5,10 @@ mod common;
 
 use closed_form::elastica::{self, Load};
 use closed_form::{cable, formula, helix};
-use common::{G, GRAVITY, MODELS, Shot, Vec3, bending_time, links, placed, placed_turned, plain, rod, straight};
-use pelage_sim::{End, Material, Model, Settings};
+use common::{
+    G, GRAVITY, MODELS, Shot, Vec3, bending_time, links, placed, placed_turned, plain, rod, straight, turned,
+};
+use pelage_sim::{End, Material, Model, Root, Settings};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Settings of a rod that comes to rest soon.
@@ -269,19 +271,16 @@ fn pushed_ends_buckle_at_eulers_loads() {
     }
 }
 
-/// Turns the tip about its direction there, and asks whether a small push grows.
-fn twisted(shot: &mut Shot, tip: [f64; 3], at_rest: f64, about: Vec3, angle: f64, push: Vec3) -> bool {
+/// Turns both ends against each other about the x axis, their direction. One end alone would roll a ring along: round
+/// hair has no favourite plane.
+fn twist_ends(shot: &mut Shot, tip: [f64; 3], at_rest: f64, angle: f64) {
     let count = 60;
     for k in 1..=count {
-        let q = nalgebra::UnitQuaternion::from_axis_angle(
-            &nalgebra::Unit::new_normalize(about),
-            angle * f64::from(k) / f64::from(count),
-        ) * nalgebra::UnitQuaternion::from_axis_angle(&Vec3::z_axis(), at_rest);
-        let mut root = placed(tip);
-        root.rotation = [q.i, q.j, q.k, q.w];
-        shot.carry(0.01, shot.roots.clone(), Some(vec![root]));
+        let half = 0.5 * angle * f64::from(k) / f64::from(count);
+        let q = turned(Vec3::x(), half).quaternion() * turned(Vec3::z(), at_rest).quaternion();
+        let end = Root { rotation: [q.i, q.j, q.k, q.w], ..placed(tip) };
+        shot.carry(0.01, vec![placed_turned([0.0; 3], Vec3::x(), -half)], Some(vec![end]));
     }
-    grows(shot, push, 400, 0.03 * bending_time(1.0))
 }
 
 #[test]
@@ -298,20 +297,19 @@ fn twisted_rods_buckle_at_greenhills_moment() {
                 ..plain(model, Material { damping: 1e-4, stretch_factor: 1e-2, ..m })
             };
             let mut shot = Shot::new(&[straight(60, Vec3::x())], &settings, [0.0; 3]);
-            let grew = twisted(&mut shot, [1.0, 0.0, 0.0], 0.0, Vec3::x(), angle, Vec3::new(0.0, 1e-6, 0.6e-6));
+            twist_ends(&mut shot, [1.0, 0.0, 0.0], 0.0, angle);
+            let grew = grows(&mut shot, Vec3::new(0.0, 1e-6, 0.6e-6), 400, 0.03 * bending_time(1.0));
             assert_eq!(grew, buckles, "{model:?} {factor}");
         }
     }
 }
 
 #[test]
-#[ignore = "small motion is accepted after one iteration, and its tangent lacks the twisting moment's part: the ring stands too long"]
 fn a_twisted_ring_leaves_its_plane_where_michell_says() {
     let n = 60;
     for model in MODELS {
-        for (factor, buckles) in [(0.95, false), (1.05, true)] {
+        for (factor, leaves) in [(0.95, false), (0.98, false), (1.02, true), (1.05, true)] {
             let m = rod(1.0);
-            // The tangent leaves out the twisting moment's second derivative: only iterations to the end find the threshold.
             let settings =
                 Settings { tip: End::Clamped, tolerance: 1e-9, ..plain(model, Material { damping: 2e-3, ..m }) };
             // A straight rod bent to a ring: every inner hinge by 2 pi / n, the clamps' by half of that.
@@ -326,11 +324,16 @@ fn a_twisted_ring_leaves_its_plane_where_michell_says() {
                 shot.carry(0.01, shot.roots.clone(), Some(vec![tip]));
             }
             shot.steps(40, 0.05);
-            let off = shot.hair(0).iter().map(|p| p.z.abs()).fold(0.0, f64::max);
+            let flat = shot.hair(0);
+            let off = flat.iter().map(|p| p.z.abs()).fold(0.0, f64::max);
             assert!(off < 1e-6, "{off}");
             let angle = factor * formula::ring_twist(2, 1.0 / (1.0 + m.poisson));
-            let grew = twisted(&mut shot, bent(2.0 * PI), 2.0 * PI, Vec3::x(), angle, Vec3::new(0.0, 0.0, 1e-6));
-            assert_eq!(grew, buckles, "{model:?} {factor}");
+            twist_ends(&mut shot, bent(2.0 * PI), 2.0 * PI, angle);
+            shot.steps(400, 0.03 * bending_time(1.0));
+            // The half hinges of the clamps carry three quarters of the shear: beside them the ring leans a little.
+            let away = shot.hair(0).iter().zip(&flat).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+            println!("{model:?} {factor}: {away:.1e} from the flat ring");
+            assert!(if leaves { away > 0.1 } else { away < 1e-3 }, "{model:?} {factor}: {away}");
         }
     }
 }
