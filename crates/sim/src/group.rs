@@ -34,6 +34,8 @@ pub struct Group {
     pub elastic: Vec<Elastic>,
     /// Where nodes are.
     pub motion: Vec<Motion>,
+    /// Whether twist can act on any of the strands.
+    pub twist: bool,
     /// Depth of subdivision that each strand starts a step with.
     pub level: [u8; LANES],
     /// Spans for which each strand has been at rest.
@@ -163,6 +165,7 @@ impl Group {
             node: vec![Node::default(); n],
             elastic: vec![Elastic::default(); n],
             motion: vec![Motion::default(); n],
+            twist: true,
             level: [0; LANES],
             quiet: [0; LANES],
             at: Default::default(),

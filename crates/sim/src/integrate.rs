@@ -91,8 +91,6 @@ pub struct Method {
     pub friction: f64,
     /// Internal damping.
     pub damping: Damping,
-    /// Whether twist can act.
-    pub twist: bool,
     /// A strand that turns farther than this in a step takes smaller ones, radians.
     pub largest_turn: f64,
     /// Largest strain.
@@ -139,6 +137,8 @@ pub struct Done {
     pub node_steps: u64,
     /// Linear solves times nodes.
     pub node_solves: u64,
+    /// Of these, with the factor of the solve before.
+    pub node_chords: u64,
     /// Depth of the deepest halving, per lane.
     pub deepest: [u8; LANES],
     /// Lanes whose motion could not be followed: it was stopped, and went on from rest.
@@ -290,8 +290,11 @@ fn step<A: Around>(
         let forget = (FORGET * dt).min(1.0);
         lanes::run(method.width, Choose { g, x: &mut work.x, forget });
     } else {
-        work.twisting.reserve(n);
-        work.straight.reserve(n);
+        if g.twist {
+            work.twisting.reserve(n);
+        } else {
+            work.straight.reserve(n);
+        }
     }
     let h = GAMMA * dt;
     let (mut converged, mut touching) = (lanes, [false; LANES]);
@@ -321,7 +324,7 @@ fn step<A: Around>(
         let pulls = reached.map(|r| around.gravity(at.start + r * at.length));
         let gravity = std::array::from_fn(|c| pick(pulls[0][c], pulls[1][c]));
         let Work { y, base, from, .. } = work;
-        let frames = g.springs.is_none();
+        let frames = g.springs.is_none() && g.twist;
         lanes::run(method.width, Predict { motion: &mut g.motion, y, base, from, h, origin, gravity, frames });
         for (lanes, reached) in [(cold, reached[0]), (warm, reached[1])] {
             if !lanes.contains(&true) {
@@ -393,30 +396,40 @@ fn solve(
     let mut active = lanes;
     let mut last = Pack::splat(FIRST_TURN);
     for iteration in 0..ITERATIONS {
-        let stage = Stage {
-            h,
-            y: &work.y,
-            base: &work.base,
-            contact: touching.contains(&true).then_some(&mut work.contact),
-            friction: method.friction,
-            refresh: iteration < FRICTION_ITERATIONS,
-            solved: iteration > 0,
-            air: blowing.then_some(&work.air),
-            active: mask(active),
-        };
-        let largest = if g.springs.is_some() {
-            let (scratch, x) = (&mut work.springs, &mut work.x);
-            lanes::run(method.width, IterateSprings { g, turned: &mut work.turned, stage, scratch, x })
-        } else if method.twist {
-            let scratch = &mut work.twisting;
-            lanes::run(method.width, Iterate { g, turned: &mut work.turned, damping: method.damping, stage, scratch })
-        } else {
-            let scratch = &mut work.straight;
-            lanes::run(method.width, Iterate { g, turned: &mut work.turned, damping: method.damping, stage, scratch })
-        };
-        for l in 0..LANES {
-            if active[l] {
-                done.node_solves += g.count[l] as u64;
+        // The second iteration of free strands has little left to do: the first one's factor is good enough.
+        let second = iteration == 1 && g.springs.is_none();
+        let chord: [bool; LANES] = std::array::from_fn(|l| second && active[l] && !touching[l]);
+        let newton: [bool; LANES] = std::array::from_fn(|l| active[l] && !chord[l]);
+        for (again, which) in [(true, chord), (false, newton)] {
+            if !which.contains(&true) {
+                continue;
+            }
+            let stage = Stage {
+                h,
+                y: &work.y,
+                base: &work.base,
+                contact: (!again && touching.contains(&true)).then_some(&mut work.contact),
+                friction: method.friction,
+                refresh: iteration < FRICTION_ITERATIONS,
+                solved: iteration > 0,
+                air: blowing.then_some(&work.air),
+                active: mask(which),
+            };
+            let (turned, damping) = (&mut work.turned, method.damping);
+            let largest = if g.springs.is_some() {
+                let (scratch, x) = (&mut work.springs, &mut work.x);
+                lanes::run(method.width, IterateSprings { g, turned, stage, scratch, x })
+            } else if g.twist {
+                let scratch = &mut work.twisting;
+                lanes::run(method.width, Iterate { g, turned, damping, stage, scratch, again })
+            } else {
+                let scratch = &mut work.straight;
+                lanes::run(method.width, Iterate { g, turned, damping, stage, scratch, again })
+            };
+            for l in (0..LANES).filter(|&l| which[l]) {
+                let n = g.count[l] as u64;
+                done.node_solves += n;
+                done.node_chords += if again { n } else { 0 };
                 let turn = largest.0[l].sqrt();
                 let ratio = (turn / last.0[l]).min(SLOWEST);
                 // What later iterations would still turn, if each turned by the same fraction of the one before.

@@ -37,7 +37,7 @@ pub struct Elastic {
 
 /// Adds the stretching of the edge from node `i` to `i + 1`.
 #[inline(always)]
-fn add_edge<L: Lanes, const D: usize, const ROWS: usize>(
+fn add_edge<L: Lanes, const D: usize, const ROWS: usize, const MATRIX: bool>(
     i: usize,
     e: &Edge<L>,
     rest: L,
@@ -53,6 +53,9 @@ fn add_edge<L: Lanes, const D: usize, const ROWS: usize>(
         let f = pull * e.t[r];
         (L::load(&rhs[i][r]) + f).store(&mut rhs[i][r]);
         (L::load(&rhs[i + 1][r]) - f).store(&mut rhs[i + 1][r]);
+        if !MATRIX {
+            continue;
+        }
         for c in 0..=r {
             let mut k = along * e.t[r] * e.t[c];
             if r == c {
@@ -94,7 +97,7 @@ fn times<L: Lanes>(a: L3<L>, b: L3<L>) -> L3<L> {
 
 /// Adds a hinge at node `i` (edges `i - 1` and `i`).
 #[inline(always)]
-fn add_hinge<L: Lanes, const D: usize, const ROWS: usize>(
+fn add_hinge<L: Lanes, const D: usize, const ROWS: usize, const MATRIX: bool>(
     i: usize,
     h: &Hinge<L>,
     w: &Weight<L>,
@@ -109,6 +112,9 @@ fn add_hinge<L: Lanes, const D: usize, const ROWS: usize>(
         (L::load(&rhs[i - 1][r]) + fa).store(&mut rhs[i - 1][r]);
         (L::load(&rhs[i][r]) + (fb - fa)).store(&mut rhs[i][r]);
         (L::load(&rhs[i + 1][r]) - fb).store(&mut rhs[i + 1][r]);
+        if !MATRIX {
+            continue;
+        }
         let (wa, wb) = (times(a, w.damped), times(b, w.damped));
         for c in 0..3 {
             ab[r][c] = ab[r][c] + dot(wa, column(&h.b, c));
@@ -120,7 +126,7 @@ fn add_hinge<L: Lanes, const D: usize, const ROWS: usize>(
         }
     }
     // The three nodes move the measures by -a, a - b and b.
-    for r in 0..3 {
+    for r in 0..if MATRIX { 3 } else { 0 } {
         for c in 0..3 {
             let first = &mut window[(i - 1) % RING].0;
             first[D + r][c] = first[D + r][c] + (ab[c][r] - aa[r][c]);
@@ -138,13 +144,13 @@ fn add_hinge<L: Lanes, const D: usize, const ROWS: usize>(
         }
     }
     if D == 4 {
-        add_turns(i, h, w, window, rhs);
+        add_turns::<L, D, ROWS, MATRIX>(i, h, w, window, rhs);
     }
 }
 
 /// The rows and columns of both edges' turns.
 #[inline(always)]
-fn add_turns<L: Lanes, const D: usize, const ROWS: usize>(
+fn add_turns<L: Lanes, const D: usize, const ROWS: usize, const MATRIX: bool>(
     i: usize,
     h: &Hinge<L>,
     w: &Weight<L>,
@@ -156,6 +162,9 @@ fn add_turns<L: Lanes, const D: usize, const ROWS: usize>(
     let t = 3;
     (L::load(&rhs[i - 1][t]) - dot(w.force, t0)).store(&mut rhs[i - 1][t]);
     (L::load(&rhs[i][t]) - dot(w.force, t1)).store(&mut rhs[i][t]);
+    if !MATRIX {
+        return;
+    }
     // The moment turns with the frames: half of the mean turn's second derivative.
     let half = L::splat(0.5);
     let (f1, f2) = (half * w.force[0], half * w.force[1]);
@@ -221,16 +230,15 @@ pub fn solve<L: Lanes, const D: usize, const ROWS: usize>(
     stage: &mut Stage<'_>,
     scratch: &mut Scratch<D, ROWS>,
 ) {
-    sweep::<L, D, ROWS>(nodes, elastic, motion, turned, damping, stage, scratch, true);
+    sweep::<L, D, ROWS, true>(nodes, elastic, motion, turned, damping, stage, scratch);
     for j in (0..nodes.len()).rev() {
         band::substitute::<L, D, ROWS>(j, &scratch.factor[j], &mut scratch.rhs);
     }
 }
 
-/// Assembles node by node and eliminates behind; without elimination, `scratch.rhs` is left with the negative gradient.
-#[allow(clippy::too_many_arguments)]
+/// The same with the factor of the last [`solve`] (a chord step): a third of the work, good where little has moved since.
 #[inline(always)]
-pub fn sweep<L: Lanes, const D: usize, const ROWS: usize>(
+pub fn solve_again<L: Lanes, const D: usize, const ROWS: usize>(
     nodes: &[Node],
     elastic: &[Elastic],
     motion: &[Motion],
@@ -238,7 +246,21 @@ pub fn sweep<L: Lanes, const D: usize, const ROWS: usize>(
     damping: Damping,
     stage: &mut Stage<'_>,
     scratch: &mut Scratch<D, ROWS>,
-    eliminate: bool,
+) {
+    sweep::<L, D, ROWS, false>(nodes, elastic, motion, turned, damping, stage, scratch);
+    band::solve::<L, D, ROWS>(&scratch.factor[..nodes.len()], &mut scratch.rhs);
+}
+
+/// Assembles node by node and eliminates behind; without a matrix, `scratch.rhs` is left with the negative gradient.
+#[inline(always)]
+pub fn sweep<L: Lanes, const D: usize, const ROWS: usize, const MATRIX: bool>(
+    nodes: &[Node],
+    elastic: &[Elastic],
+    motion: &[Motion],
+    turned: &[Pack],
+    damping: Damping,
+    stage: &mut Stage<'_>,
+    scratch: &mut Scratch<D, ROWS>,
 ) {
     let zero = L::splat(0.0);
     let n = nodes.len();
@@ -253,12 +275,13 @@ pub fn sweep<L: Lanes, const D: usize, const ROWS: usize>(
     let spin_scale = L::splat(1.0 / (stage.h * stage.h));
     let mut before: Option<Edge<L>> = None;
     let mut here = edge::<L>(load3(&motion[0].x), load3(&motion[1].x));
-    open_turn::<L, D, ROWS>(0, nodes, elastic, motion, stage, &mut window, rhs, spin_scale);
+    open_turn::<L, D, ROWS, MATRIX>(0, nodes, elastic, motion, stage, &mut window, rhs, spin_scale);
     for i in 0..n {
         if i + 1 < n {
             let next = if i + 2 < n { edge::<L>(load3(&motion[i + 1].x), load3(&motion[i + 2].x)) } else { here };
-            open_turn::<L, D, ROWS>(i + 1, nodes, elastic, motion, stage, &mut window, rhs, spin_scale);
-            add_edge(i, &here, L::load(&nodes[i].length), L::load(&elastic[i].stretch), &mut window, rhs);
+            open_turn::<L, D, ROWS, MATRIX>(i + 1, nodes, elastic, motion, stage, &mut window, rhs, spin_scale);
+            let (rest, stretch) = (L::load(&nodes[i].length), L::load(&elastic[i].stretch));
+            add_edge::<L, D, ROWS, MATRIX>(i, &here, rest, stretch, &mut window, rhs);
             if let Some(e0) = &before {
                 let e = &elastic[i];
                 let h = if D == 4 {
@@ -282,23 +305,25 @@ pub fn sweep<L: Lanes, const D: usize, const ROWS: usize>(
                     w.force[q] = w.k[q] * r;
                     w.damped[q] = w.k[q] * damp;
                 }
-                let second = if D == 4 {
+                let second = if !MATRIX {
+                    Blocks { aa: [[zero; 3]; 3], ab: [[zero; 3]; 3], bb: [[zero; 3]; 3] }
+                } else if D == 4 {
                     let m = [load3::<L>(&motion[i - 1].m), load3::<L>(&motion[i].m)];
                     let moment = moment([e0, &here], m, &h, w.force);
                     second(e0, &here, add3(moment.n[0], moment.n[1]), Some(moment))
                 } else {
                     second(e0, &here, w.force, None)
                 };
-                add_hinge(i, &h, &w, second, &mut window, rhs);
+                add_hinge::<L, D, ROWS, MATRIX>(i, &h, &w, second, &mut window, rhs);
             }
             before = Some(here);
             here = next;
         }
-        if eliminate && i >= 1 {
+        if MATRIX && i >= 1 {
             band::eliminate::<L, D, ROWS>(i - 1, &mut window, &mut scratch.factor[i - 1], rhs);
         }
     }
-    if eliminate {
+    if MATRIX {
         band::eliminate::<L, D, ROWS>(n - 1, &mut window, &mut scratch.factor[n - 1], rhs);
     }
 }
@@ -314,7 +339,7 @@ fn change<L: Lanes>(j: usize, motion: &[Motion], stage: &Stage<'_>) -> L3<L> {
 /// braked from outside (a hundredth of its angular momentum in half a second).
 #[allow(clippy::too_many_arguments)]
 #[inline(always)]
-fn open_turn<L: Lanes, const D: usize, const ROWS: usize>(
+fn open_turn<L: Lanes, const D: usize, const ROWS: usize, const MATRIX: bool>(
     j: usize,
     nodes: &[Node],
     elastic: &[Elastic],
@@ -324,8 +349,8 @@ fn open_turn<L: Lanes, const D: usize, const ROWS: usize>(
     rhs: &mut [[Pack; D]],
     spin_scale: L,
 ) {
-    open_node(j, &nodes[j], &motion[j], stage, window, &mut rhs[j]);
-    if D == 4 {
+    open_node::<L, D, ROWS, MATRIX>(j, &nodes[j], &motion[j], stage, window, &mut rhs[j]);
+    if MATRIX && D == 4 {
         let spin = L::load(&elastic[j].spin) * spin_scale;
         window[j % RING].0[3][3] = spin + L::load(&nodes[j].held_turn);
     }
@@ -592,7 +617,11 @@ mod tests {
                 active: Pack::splat(1.0),
             };
             let damping = Damping(0.0);
-            sweep::<Plain, 4, 11>(&model.0, &model.1, motion, &turned, damping, &mut stage, &mut scratch, eliminate);
+            if eliminate {
+                sweep::<Plain, 4, 11, true>(&model.0, &model.1, motion, &turned, damping, &mut stage, &mut scratch);
+            } else {
+                sweep::<Plain, 4, 11, false>(&model.0, &model.1, motion, &turned, damping, &mut stage, &mut scratch);
+            }
             scratch.clone()
         };
         let rhs = run(false).rhs;

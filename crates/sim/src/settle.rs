@@ -49,12 +49,12 @@ pub fn prepare(strands: &[Strand], settings: &Settings, gravity: [f64; 3]) -> (G
             figures.hinge = figures.hinge.max(angle(w[1] - w[0], w[2] - w[1]));
         }
     }
-    // Only a strand that is clamped at one end and free at the other is determinate.
-    let sag_free = settings.sag_free && settings.root == End::Clamped && settings.tip == End::Free;
+    let sag_free = is_sag_free(settings);
     if settings.model != Model::Rod {
         return (prepare_springs(strands, settings, gravity, sag_free, &mut figures), figures);
     }
     let mut group = Group::pack(strands, settings);
+    group.twist = strands.iter().any(|s| twists(s, settings));
     let width = settings.width();
     let (weight, free) = weights(&group, gravity);
     let settle = |group: &mut Group| {
@@ -129,6 +129,21 @@ fn prepare_springs(
     }
     Group::pack_springs(strands, &layouts, &models)
 }
+
+/// Whether natural shapes are found that hang into the groomed pose. Only a strand that is clamped at one end and free at
+/// the other is determinate.
+fn is_sag_free(settings: &Settings) -> bool {
+    settings.sag_free && settings.root == End::Clamped && settings.tip == End::Free
+}
+
+/// Whether twist can act on a strand: not on a round hair that is straight by nature and that nothing turns at its tip.
+pub fn twists(s: &Strand, settings: &Settings) -> bool {
+    let bent = |w: &[Vec3]| angle(w[1] - w[0], w[2] - w[1]) > STRAIGHT;
+    is_sag_free(settings) || settings.tip == End::Clamped || s.point.windows(3).any(bent)
+}
+
+/// Hinges with less than this angle are straight, radians. Rounding makes 1e-16; what is left out shows at 1e-6.
+const STRAIGHT: f64 = 1e-9;
 
 /// Angle between two vectors, radians.
 fn angle(a: Vec3, b: Vec3) -> f64 {
@@ -278,7 +293,7 @@ impl Kernel for Gradient<'_> {
         };
         let turned = vec![Pack::default(); g.node.len()];
         let damping = Damping(0.0);
-        rod::sweep::<L, 4, 11>(&g.node, &g.elastic, &g.motion, &turned, damping, &mut stage, self.scratch, false);
+        rod::sweep::<L, 4, 11, false>(&g.node, &g.elastic, &g.motion, &turned, damping, &mut stage, self.scratch);
     }
 }
 

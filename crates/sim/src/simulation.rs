@@ -93,6 +93,8 @@ pub struct SpanReport {
     pub particle_steps: u64,
     /// Linear solves times points.
     pub particle_solves: u64,
+    /// Of these, with the factor of the solve before.
+    pub particle_chords: u64,
     /// Largest strain at the end.
     pub largest_strain: f64,
     /// Strands that took steps of their own.
@@ -213,10 +215,12 @@ impl Simulation {
                 strands.push(Strand { index: h, point: own });
             }
         }
-        // Strands of like length share a group, so that little is padded.
-        strands.sort_by_key(|s| s.point.len());
-        let prepare = |s: &[Strand]| settle::prepare(s, settings, gravity);
-        let (group, figures): (Vec<Group>, Vec<_>) = strands.par_chunks(LANES).map(prepare).unzip();
+        // Strands of like length share a group, so that little is padded; those that never twist have their own.
+        strands.sort_by_key(|s| (settle::twists(s, settings), s.point.len()));
+        let (plain, twisting) = strands.split_at(strands.partition_point(|s| !settle::twists(s, settings)));
+        let chunks: Vec<&[Strand]> = plain.chunks(LANES).chain(twisting.chunks(LANES)).collect();
+        let prepare = |s: &&[Strand]| settle::prepare(s, settings, gravity);
+        let (group, figures): (Vec<Group>, Vec<_>) = chunks.par_iter().map(prepare).unzip();
         let mut place = vec![None; hairs.offsets.len()];
         for (i, g) in group.iter().enumerate() {
             for (l, s) in g.strand.iter().enumerate() {
@@ -262,7 +266,6 @@ impl Simulation {
             tolerance: self.settings.tolerance,
             friction: self.settings.friction,
             damping: Damping(self.settings.material.damping),
-            twist: true,
             largest_turn: self.settings.largest_turn,
             strain_limit: self.settings.strain_limit,
         };
@@ -296,6 +299,7 @@ impl Simulation {
             let d = &d.done;
             report.particle_steps += d.node_steps;
             report.particle_solves += d.node_solves;
+            report.particle_chords += d.node_chords;
             for l in 0..LANES {
                 let Some(s) = g.strand[l] else { continue };
                 report.largest_strain = report.largest_strain.max(d.strain[l]);

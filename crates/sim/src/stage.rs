@@ -99,9 +99,9 @@ pub struct Stage<'a> {
     pub active: Pack,
 }
 
-/// Opens the panel of a node: inertia, contact and friction, drag.
+/// Opens the panel of a node, if there is to be a matrix, and its right-hand side: inertia, contact and friction, drag.
 #[inline(always)]
-pub fn open_node<L: Lanes, const D: usize, const ROWS: usize>(
+pub fn open_node<L: Lanes, const D: usize, const ROWS: usize, const MATRIX: bool>(
     j: usize,
     node: &Node,
     motion: &Motion,
@@ -115,17 +115,19 @@ pub fn open_node<L: Lanes, const D: usize, const ROWS: usize>(
     let inertia = L::load(&node.mass) * inverse_h * inverse_h;
     let x = load3::<L>(&motion.x);
     let p = &mut window[j % crate::band::RING];
-    for r in 0..ROWS {
-        for c in 0..D {
-            if r >= c {
-                p.0[r][c] = zero;
+    let mut b = scale3(sub3(load3(&stage.y[j]), x), inertia);
+    if MATRIX {
+        for r in 0..ROWS {
+            for c in 0..D {
+                if r >= c {
+                    p.0[r][c] = zero;
+                }
             }
         }
-    }
-    let diagonal = inertia + L::load(&node.held);
-    let mut b = scale3(sub3(load3(&stage.y[j]), x), inertia);
-    for c in 0..3 {
-        p.0[c][c] = diagonal;
+        let diagonal = inertia + L::load(&node.held);
+        for c in 0..3 {
+            p.0[c][c] = diagonal;
+        }
     }
     if let Some(air) = stage.air {
         let air = &air[j];
@@ -136,6 +138,9 @@ pub fn open_node<L: Lanes, const D: usize, const ROWS: usize>(
         let more = (along - across) * dot(tangent, relative);
         for r in 0..3 {
             b[r] = across.neg_mul_add(relative[r], more.neg_mul_add(tangent[r], b[r]));
+            if !MATRIX {
+                continue;
+            }
             p.0[r][r] = across.mul_add(inverse_h, p.0[r][r]);
             for c in 0..=r {
                 p.0[r][c] = ((along - across) * inverse_h * tangent[r]).mul_add(tangent[c], p.0[r][c]);
@@ -144,6 +149,8 @@ pub fn open_node<L: Lanes, const D: usize, const ROWS: usize>(
     }
     if let Some(contact) = &mut stage.contact {
         let contact = &mut contact[j];
+        // Strands that are done keep what they have, however long their neighbours take.
+        let active = L::load(&stage.active);
         let n = load3::<L>(&contact.normal);
         let depth = (L::load(&contact.level) - dot(n, x)).max(zero);
         let stiffness = L::if_gt(depth, zero, L::load(&contact.stiffness), zero);
@@ -155,14 +162,18 @@ pub fn open_node<L: Lanes, const D: usize, const ROWS: usize>(
         if stage.refresh {
             let reach = dot(slip, slip).sqrt().max(L::splat(1e-12));
             let limit = L::splat(stage.friction) * L::load(&contact.force) / reach;
-            limit.min(L::load(&contact.grip)).store(&mut contact.hold);
+            let hold = L::if_gt(active, zero, limit.min(L::load(&contact.grip)), L::load(&contact.hold));
+            hold.store(&mut contact.hold);
         }
         let hold = L::if_gt(depth, zero, L::load(&contact.hold), zero);
         if stage.solved {
-            force.store(&mut contact.force);
+            L::if_gt(active, zero, force, L::load(&contact.force)).store(&mut contact.force);
         }
         for r in 0..3 {
             b[r] = hold.neg_mul_add(slip[r], force.mul_add(n[r], b[r]));
+            if !MATRIX {
+                continue;
+            }
             p.0[r][r] = p.0[r][r] + hold;
             for c in 0..=r {
                 p.0[r][c] = ((stiffness - hold) * n[r]).mul_add(n[c], p.0[r][c]);

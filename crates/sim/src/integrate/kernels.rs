@@ -16,14 +16,20 @@ pub(super) struct Iterate<'a, 'b, const D: usize, const ROWS: usize> {
     pub(super) damping: Damping,
     pub(super) stage: Stage<'b>,
     pub(super) scratch: &'a mut Scratch<D, ROWS>,
+    /// With the factor of the last iteration.
+    pub(super) again: bool,
 }
 
 impl<const D: usize, const ROWS: usize> Kernel for Iterate<'_, '_, D, ROWS> {
     type Out = Pack;
     #[inline(always)]
     fn run<L: Lanes>(self) -> Pack {
-        let Iterate { g, turned, damping, mut stage, scratch } = self;
-        rod::solve::<L, D, ROWS>(&g.node, &g.elastic, &g.motion, turned, damping, &mut stage, scratch);
+        let Iterate { g, turned, damping, mut stage, scratch, again } = self;
+        if again {
+            rod::solve_again::<L, D, ROWS>(&g.node, &g.elastic, &g.motion, turned, damping, &mut stage, scratch);
+        } else {
+            rod::solve::<L, D, ROWS>(&g.node, &g.elastic, &g.motion, turned, damping, &mut stage, scratch);
+        }
         let largest = rod::apply::<L, D, ROWS>(&g.node, &mut g.motion, turned, &stage.active, scratch);
         let mut out = Pack::default();
         largest.store(&mut out);
@@ -55,7 +61,7 @@ impl Kernel for IterateSprings<'_, '_> {
         let mut window: Window<L, 3, 12> = [Panel::zero(); RING];
         for i in 0..n + 3 {
             if i < n {
-                open_node(i, &g.node[i], &g.motion[i], &mut stage, &mut window, &mut rhs[i]);
+                open_node::<L, 3, 12, true>(i, &g.node[i], &g.motion[i], &mut stage, &mut window, &mut rhs[i]);
                 kernel::add_node::<L, true>(i, &springs.model.model[i], &springs.altitude[i], x, &mut window, rhs);
             }
             if i >= 3 {
