@@ -48,17 +48,20 @@ impl Kernel for IterateSprings<'_, '_> {
     fn run<L: Lanes>(self) -> Pack {
         let IterateSprings { g, turned, mut stage, scratch, x } = self;
         let n = g.node.len();
-        let springs = g.springs.as_ref().expect("a group of springs");
+        let springs = g.springs.as_mut().expect("a group of springs");
         positions(&g.motion, x);
         let rhs = &mut scratch.rhs[..n + 4];
         for r in &mut rhs[n..] {
             *r = [Pack::default(); 3];
         }
         let mut window: Window<L, 3, 12> = [Panel::zero(); RING];
+        let base = stage.base;
+        let rate = L::splat(springs.model.damping / stage.h);
         for i in 0..n + 3 {
             if i < n {
                 open_node(i, &g.node[i], &g.motion[i], &mut stage, &mut window, &mut rhs[i]);
-                kernel::add_node::<L, true>(i, &springs.model.model[i], &springs.altitude[i], x, &mut window, rhs);
+                let (model, altitude) = (&springs.model.model[i], &springs.altitude[i]);
+                kernel::add_node::<L, true>(i, model, altitude, x, base, rate, &mut window, rhs);
             }
             if i >= 3 {
                 band::eliminate::<L, 3, 12>(i - 3, &mut window, &mut scratch.factor[i - 3], rhs);
@@ -66,6 +69,10 @@ impl Kernel for IterateSprings<'_, '_> {
         }
         for j in (0..n).rev() {
             band::substitute::<L, 3, 12>(j, &scratch.factor[j], rhs);
+        }
+        let active = L::load(&stage.active);
+        for i in 1..n {
+            kernel::pull_node(i, &springs.model.model[i], &mut springs.altitude[i], x, Some((rhs, active)));
         }
         let largest = rod::apply::<L, 3, 12>(&g.node, &mut g.motion, turned, &stage.active, scratch);
         let mut out = Pack::default();
@@ -97,6 +104,9 @@ impl Kernel for Choose<'_> {
             let (candidates, altitude) = (&springs.model.candidates[i], &mut springs.altitude[i]);
             kernel::choose_node::<L>(i, candidates, altitude, x, L::splat(forget));
         }
+        for i in 1..x.len() {
+            kernel::pull_node::<L>(i, &springs.model.model[i], &mut springs.altitude[i], x, None);
+        }
         for (m, x) in g.motion.iter_mut().zip(x.iter()) {
             m.x = *x;
         }
@@ -118,7 +128,16 @@ impl Kernel for LimitSprings<'_> {
         let LimitSprings { g, x, limit, dt } = self;
         positions(&g.motion, x);
         let springs = g.springs.as_ref().expect("a group of springs");
-        limit_springs::<L>(&springs.model, x, limit);
+        // Only strands that are themselves too long: what others in the group do must not touch a strand.
+        let (mut strain, zero) = (L::splat(0.0), L::splat(0.0));
+        for i in 0..x.len() - 1 {
+            let e = sub3(load3::<L>(&x[i + 1]), load3(&x[i]));
+            let rest = L::load(&g.node[i].length);
+            let stretched = (lanes::dot(e, e).sqrt() - rest) / rest;
+            let real = L::if_gt(L::load(&g.elastic[i].stretch), zero, stretched.max(-stretched), zero);
+            strain = real.max(strain);
+        }
+        limit_springs::<L>(&springs.model, x, limit, strain - L::splat(limit));
         for (m, x) in g.motion.iter_mut().zip(x.iter()) {
             for c in 0..3 {
                 for l in 0..LANES {
