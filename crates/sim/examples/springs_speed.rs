@@ -55,7 +55,8 @@ impl Kernel for Step<'_> {
                 }
                 b.store(&mut self.rhs[i][c]);
             }
-            kernel::add_node::<L, true>(i, &group.model[i], &altitudes[i], x, &mut window, self.rhs);
+            let (model, altitude) = (&group.model[i], &altitudes[i]);
+            kernel::add_node::<L, true>(i, model, altitude, x, x, L::splat(0.0), &mut window, self.rhs);
             if i >= 3 {
                 band::eliminate(i - 3, &mut window, &mut self.factor[i - 3], self.rhs);
             }

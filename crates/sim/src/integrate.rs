@@ -182,6 +182,7 @@ pub fn advance<A: Around>(
         let saved = save(g, work, depth);
         let converged = step(g, around, method, at, now, &saved.motion, work, done);
         let seen = look(g, method, &saved.motion);
+        let (mut long, mut halted) = ([false; LANES], [false; LANES]);
         for l in 0..LANES {
             let finite = seen.finite.0[l] == 0.0;
             let calm = converged[l] && finite && seen.turn.0[l] <= method.largest_turn * method.largest_turn;
@@ -189,15 +190,14 @@ pub fn advance<A: Around>(
             if now[l] && (calm || (last && finite)) {
                 done.deepest[l] = done.deepest[l].max(depth);
                 done.strain[l] = seen.strain.0[l];
-                if seen.strain.0[l] > method.strain_limit && g.springs.is_none() {
-                    limit_strain(g, l, method.strain_limit, at.length * at.span);
-                    g.forget_acceleration(l);
+                if seen.strain.0[l] > method.strain_limit {
+                    long[l] = true;
                     done.strain[l] = method.strain_limit;
                 }
                 if !calm && !settled {
                     // What can't be followed in the shortest step goes on from rest: folds open, heaps spread.
-                    g.stop(l);
                     done.stopped[l] = true;
+                    halted[l] = true;
                 }
                 done.speed[l] = seen.speed.0[l].sqrt();
                 // Half the turn would have been fine with twice the step.
@@ -217,10 +217,19 @@ pub fn advance<A: Around>(
             }
         }
         work.saved[depth as usize] = saved;
-        if g.springs.is_some() && (0..LANES).any(|l| now[l] && seen.strain.0[l] > method.strain_limit) {
-            let dt = at.length * at.span;
-            lanes::run(method.width, LimitSprings { g, x: &mut work.x, limit: method.strain_limit, dt });
+        if long.contains(&true) {
+            let (limit, dt) = (method.strain_limit, at.length * at.span);
+            if g.springs.is_some() {
+                lanes::run(method.width, LimitSprings { g, x: &mut work.x, limit, dt, due: mask(long) });
+            }
+            for l in (0..LANES).filter(|&l| long[l]) {
+                if g.springs.is_none() {
+                    limit_strain(g, l, limit, dt);
+                }
+                g.forget_acceleration(l);
+            }
         }
+        (0..LANES).filter(|&l| halted[l]).for_each(|l| g.stop(l));
     }
     if deeper.contains(&true) {
         let half = 0.5 * at.length;
@@ -323,9 +332,12 @@ fn step<A: Around>(
         };
         let pulls = reached.map(|r| around.gravity(at.start + r * at.length));
         let gravity = std::array::from_fn(|c| pick(pulls[0][c], pulls[1][c]));
-        let Work { y, base, from, .. } = work;
-        let frames = g.springs.is_none() && g.twist;
-        lanes::run(method.width, Predict { motion: &mut g.motion, y, base, from, h, origin, gravity, frames });
+        let Work { y, base, from, twisting, straight, .. } = work;
+        let (rods, frames) = (g.springs.is_none(), g.twist);
+        let pull = rods.then_some(if frames { &mut twisting.pull[..] } else { &mut straight.pull[..] });
+        let Group { node, elastic, motion, .. } = &mut *g;
+        let predict = Predict { node, elastic, motion, pull, y, base, from, h, origin, gravity, frames };
+        lanes::run(method.width, predict);
         for (lanes, reached) in [(cold, reached[0]), (warm, reached[1])] {
             if !lanes.contains(&true) {
                 continue;

@@ -42,12 +42,13 @@ fn add_edge<L: Lanes, const D: usize, const ROWS: usize, const MATRIX: bool>(
     e: &Edge<L>,
     rest: L,
     stiffness: L,
+    foreseen: L,
     window: &mut Window<L, D, ROWS>,
     rhs: &mut [[Pack; D]],
 ) {
     let zero = L::splat(0.0);
     let pull = stiffness * (e.length - rest);
-    let across = pull.max(zero) * e.inverse;
+    let across = foreseen.max(zero) * e.inverse;
     let along = stiffness - across;
     for r in 0..3 {
         let f = pull * e.t[r];
@@ -203,6 +204,10 @@ pub struct Scratch<const D: usize, const ROWS: usize> {
     pub rhs: Vec<[Pack; D]>,
     /// The factor.
     pub factor: Vec<Column<D, ROWS>>,
+    /// Tension of the edge from each node to the next as the tangent has it, newtons: that of the last converged state, then
+    /// that to which each iteration leads by its own, linear reckoning. Nodes move along straight lines, so positions in
+    /// between are stretched by half a turn's square, and the tension of that would stiffen bending manyfold.
+    pub pull: Vec<Pack>,
 }
 
 impl<const D: usize, const ROWS: usize> Scratch<D, ROWS> {
@@ -210,6 +215,7 @@ impl<const D: usize, const ROWS: usize> Scratch<D, ROWS> {
     pub fn reserve(&mut self, nodes: usize) {
         self.rhs.resize(nodes + 4, [Pack::default(); D]);
         self.factor.resize(nodes, [[Pack::default(); D]; ROWS]);
+        self.pull.resize(nodes, Pack::default());
     }
 }
 
@@ -281,7 +287,7 @@ pub fn sweep<L: Lanes, const D: usize, const ROWS: usize, const MATRIX: bool>(
             let next = if i + 2 < n { edge::<L>(load3(&motion[i + 1].x), load3(&motion[i + 2].x)) } else { here };
             open_turn::<L, D, ROWS, MATRIX>(i + 1, nodes, elastic, motion, stage, &mut window, rhs, spin_scale);
             let (rest, stretch) = (L::load(&nodes[i].length), L::load(&elastic[i].stretch));
-            add_edge::<L, D, ROWS, MATRIX>(i, &here, rest, stretch, &mut window, rhs);
+            add_edge::<L, D, ROWS, MATRIX>(i, &here, rest, stretch, L::load(&scratch.pull[i]), &mut window, rhs);
             if let Some(e0) = &before {
                 let e = &elastic[i];
                 let h = if D == 4 {
@@ -388,10 +394,11 @@ pub(crate) fn carry<L: Lanes>(from: &Edge<L>, to: &Edge<L>, m: &mut [Pack; 3]) {
 #[inline(always)]
 pub fn apply<L: Lanes, const D: usize, const ROWS: usize>(
     nodes: &[Node],
+    elastic: Option<&[Elastic]>,
     motion: &mut [Motion],
     turned: &mut [Pack],
     active: &Pack,
-    scratch: &Scratch<D, ROWS>,
+    scratch: &mut Scratch<D, ROWS>,
 ) -> L {
     let (zero, one) = (L::splat(0.0), L::splat(1.0));
     let n = nodes.len();
@@ -420,6 +427,13 @@ pub fn apply<L: Lanes, const D: usize, const ROWS: usize>(
         let old_next = load3::<L>(&motion[j].x);
         let new_next = moved(old_next, delta::<L, D>(&scratch.rhs[j]), scale);
         store3(new_next, &mut motion[j].x);
+        if let Some(elastic) = elastic {
+            let e0 = edge(old, old_next);
+            let by = sub3(delta::<L, D>(&scratch.rhs[j]), delta::<L, D>(&scratch.rhs[j - 1]));
+            let long = dot(e0.t, by).mul_add(scale, e0.length) - L::load(&nodes[j - 1].length);
+            let pull = L::load(&elastic[j - 1].stretch) * long;
+            L::if_gt(scale, zero, pull, L::load(&scratch.pull[j - 1])).store(&mut scratch.pull[j - 1]);
+        }
         if D == 4 {
             let (e0, e1) = (edge(old, old_next), edge(new, new_next));
             let m = carried(&e0, &e1, load3(&motion[j - 1].m));

@@ -263,7 +263,7 @@ impl Kernel for Step<'_> {
         }
         let mut turned = vec![Pack::default(); n];
         let Group { node, motion, .. } = moved;
-        rod::apply::<L, 4, 11>(node, motion, &mut turned, &Pack::splat(1.0), scratch);
+        rod::apply::<L, 4, 11>(node, None, motion, &mut turned, &Pack::splat(1.0), scratch);
     }
 }
 

@@ -4,10 +4,10 @@ use crate::band::{self, Panel, RING, Window};
 use crate::group::Group;
 use crate::hinge::edge;
 use crate::lanes::{Kernel, L3, LANES, Lanes, Pack, load3, mul_add3, scale3, store3, sub3};
-use crate::rod::{self, Damping, Scratch, Watch};
+use crate::rod::{self, Damping, Elastic, Scratch, Watch};
 use crate::springs::kernel;
 use crate::springs::paper::limit_strain as limit_springs;
-use crate::stage::{Motion, Stage, open_node};
+use crate::stage::{Motion, Node, Stage, open_node};
 
 /// One iteration of a rod.
 pub(super) struct Iterate<'a, 'b, const D: usize, const ROWS: usize> {
@@ -30,7 +30,7 @@ impl<const D: usize, const ROWS: usize> Kernel for Iterate<'_, '_, D, ROWS> {
         } else {
             rod::solve::<L, D, ROWS>(&g.node, &g.elastic, &g.motion, turned, damping, &mut stage, scratch);
         }
-        let largest = rod::apply::<L, D, ROWS>(&g.node, &mut g.motion, turned, &stage.active, scratch);
+        let largest = rod::apply::<L, D, ROWS>(&g.node, Some(&g.elastic), &mut g.motion, turned, &stage.active, scratch);
         let mut out = Pack::default();
         largest.store(&mut out);
         out
@@ -52,17 +52,20 @@ impl Kernel for IterateSprings<'_, '_> {
     fn run<L: Lanes>(self) -> Pack {
         let IterateSprings { g, turned, mut stage, scratch, x } = self;
         let n = g.node.len();
-        let springs = g.springs.as_ref().expect("a group of springs");
+        let springs = g.springs.as_mut().expect("a group of springs");
         positions(&g.motion, x);
         let rhs = &mut scratch.rhs[..n + 4];
         for r in &mut rhs[n..] {
             *r = [Pack::default(); 3];
         }
         let mut window: Window<L, 3, 12> = [Panel::zero(); RING];
+        let base = stage.base;
+        let rate = L::splat(springs.model.damping / stage.h);
         for i in 0..n + 3 {
             if i < n {
                 open_node::<L, 3, 12, true>(i, &g.node[i], &g.motion[i], &mut stage, &mut window, &mut rhs[i]);
-                kernel::add_node::<L, true>(i, &springs.model.model[i], &springs.altitude[i], x, &mut window, rhs);
+                let (model, altitude) = (&springs.model.model[i], &springs.altitude[i]);
+                kernel::add_node::<L, true>(i, model, altitude, x, base, rate, &mut window, rhs);
             }
             if i >= 3 {
                 band::eliminate::<L, 3, 12>(i - 3, &mut window, &mut scratch.factor[i - 3], rhs);
@@ -71,7 +74,11 @@ impl Kernel for IterateSprings<'_, '_> {
         for j in (0..n).rev() {
             band::substitute::<L, 3, 12>(j, &scratch.factor[j], rhs);
         }
-        let largest = rod::apply::<L, 3, 12>(&g.node, &mut g.motion, turned, &stage.active, scratch);
+        let active = L::load(&stage.active);
+        for i in 1..n {
+            kernel::pull_node(i, &springs.model.model[i], &mut springs.altitude[i], x, Some((rhs, active)));
+        }
+        let largest = rod::apply::<L, 3, 12>(&g.node, None, &mut g.motion, turned, &stage.active, scratch);
         let mut out = Pack::default();
         largest.store(&mut out);
         out
@@ -101,6 +108,9 @@ impl Kernel for Choose<'_> {
             let (candidates, altitude) = (&springs.model.candidates[i], &mut springs.altitude[i]);
             kernel::choose_node::<L>(i, candidates, altitude, x, L::splat(forget));
         }
+        for i in 1..x.len() {
+            kernel::pull_node::<L>(i, &springs.model.model[i], &mut springs.altitude[i], x, None);
+        }
         for (m, x) in g.motion.iter_mut().zip(x.iter()) {
             m.x = *x;
         }
@@ -113,16 +123,18 @@ pub(super) struct LimitSprings<'a> {
     pub(super) x: &'a mut Vec<[Pack; 3]>,
     pub(super) limit: f64,
     pub(super) dt: f64,
+    /// Strands that are too long: 1, others 0.
+    pub(super) due: Pack,
 }
 
 impl Kernel for LimitSprings<'_> {
     type Out = ();
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let LimitSprings { g, x, limit, dt } = self;
+        let LimitSprings { g, x, limit, dt, due } = self;
         positions(&g.motion, x);
         let springs = g.springs.as_ref().expect("a group of springs");
-        limit_springs::<L>(&springs.model, x, limit);
+        limit_springs::<L>(&springs.model, x, limit, L::load(&due));
         for (m, x) in g.motion.iter_mut().zip(x.iter()) {
             for c in 0..3 {
                 for l in 0..LANES {
@@ -150,7 +162,11 @@ pub(super) enum Origin {
 
 /// Free flight and the first guess of a stage.
 pub(super) struct Predict<'a> {
+    pub(super) node: &'a [Node],
+    pub(super) elastic: &'a [Elastic],
     pub(super) motion: &'a mut [Motion],
+    /// Tension of rods' edges.
+    pub(super) pull: Option<&'a mut [Pack]>,
     pub(super) y: &'a mut [[Pack; 3]],
     pub(super) base: &'a mut [[Pack; 3]],
     pub(super) from: &'a mut [[Pack; 3]],
@@ -164,7 +180,7 @@ pub(super) struct Predict<'a> {
 impl Kernel for Predict<'_> {
     type Out = ();
     #[inline(always)]
-    fn run<L: Lanes>(self) {
+    fn run<L: Lanes>(mut self) {
         let h = L::splat(self.h);
         let inverse = L::splat(1.0 / self.h);
         let fall: L3<L> = load3(&self.gravity);
@@ -191,8 +207,13 @@ impl Kernel for Predict<'_> {
             store3(new, &mut m.x);
             store3(base, &mut self.base[i]);
             store3(from, &mut self.from[i]);
-            if let (true, Some((was, is))) = (self.frames, behind) {
-                rod::carry(&edge(was, old), &edge(is, new), &mut self.motion[i - 1].m);
+            if let (Some(pull), Some((was, is))) = (&mut self.pull, behind) {
+                let before = edge(was, old);
+                let (rest, stretch) = (L::load(&self.node[i - 1].length), L::load(&self.elastic[i - 1].stretch));
+                (stretch * (before.length - rest)).store(&mut pull[i - 1]);
+                if self.frames {
+                    rod::carry(&before, &edge(is, new), &mut self.motion[i - 1].m);
+                }
             }
             behind = Some((old, new));
         }

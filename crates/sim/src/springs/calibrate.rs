@@ -27,6 +27,8 @@ pub struct Section {
     pub twisting: f64,
     /// Mass per length, kilograms per metre.
     pub line_density: f64,
+    /// Relaxation time of bending and twisting, seconds.
+    pub damping: f64,
 }
 
 impl Section {
@@ -40,6 +42,7 @@ impl Section {
             bending: bending * m.bend_factor,
             twisting: bending / (1.0 + m.poisson) * m.twist_factor,
             line_density: m.density * area,
+            damping: m.damping,
         }
     }
 }

@@ -3,7 +3,7 @@
 //! The same model as [`super::plain`]. Constants that every solve reads, state, and what only the choice of altitudes
 //! reads, once a step, lie apart, so that memory is read once and no more than needed.
 
-use super::plain::{COINCIDENT, COLINEAR, Choice, FIRM, HALF, HYSTERESIS, Model, NUDGE};
+use super::plain::{COINCIDENT, COLINEAR, Choice, FIRM, HALF, HYSTERESIS, LOWEST, Model, NUDGE};
 use super::tetrahedron::{CANDIDATES, TINY, chosen};
 use crate::band::{RING, Window};
 use crate::lanes::{self, L3, LANES, Lanes, Pack};
@@ -15,6 +15,8 @@ pub struct NodeModel {
     pub stiffness: [Pack; 3],
     /// Their rest lengths, metres.
     pub length: [Pack; 3],
+    /// 1 where the second spring bends a hinge, 0 where it is a segment over its extra particle.
+    pub bends: Pack,
     /// `K` of the altitude spring, joules.
     pub altitude: Pack,
 }
@@ -28,6 +30,8 @@ pub struct NodeAltitude {
     pub inverse_height: Pack,
     /// Strain carried over changes less the rest strain.
     pub offset: Pack,
+    /// Pull of the first two springs over their length as the tangent has it, newtons per metre ([`pull_node`]).
+    pub pull: [Pack; 2],
 }
 
 /// What only the choice of altitudes reads.
@@ -54,6 +58,8 @@ pub struct Group {
     pub held: Vec<Pack>,
     /// 1 where the particle before is an extra one: the axis runs from the second particle before.
     pub skip: Vec<Pack>,
+    /// Relaxation time of bending and twisting, seconds.
+    pub damping: f64,
 }
 
 /// Packs at most [`LANES`] strands; further lanes and the ends of shorter strands are inert.
@@ -61,11 +67,12 @@ pub fn pack(strands: &[&Model]) -> Group {
     let n = strands.iter().map(|s| s.mass.len()).max().unwrap_or(0);
     let (zero, one) = (Pack::default(), Pack::splat(1.0));
     let mut group = Group {
-        model: vec![NodeModel { stiffness: [zero; 3], length: [one; 3], altitude: zero }; n],
+        model: vec![NodeModel { stiffness: [zero; 3], length: [one; 3], bends: zero, altitude: zero }; n],
         candidates: vec![NodeCandidates::default(); n],
         mass: vec![one; n],
         held: vec![one; n],
         skip: vec![zero; n],
+        damping: strands.first().map_or(0.0, |s| s.damping),
     };
     for (lane, s) in strands.iter().enumerate().take(LANES) {
         for i in 0..s.mass.len() {
@@ -76,6 +83,7 @@ pub fn pack(strands: &[&Model]) -> Group {
                     m.length[k].0[lane] = spring.length;
                 }
             }
+            m.bends.0[lane] = f64::from(u8::from(i >= 2 && !s.extra[i - 1]));
             m.altitude.0[lane] = s.tetrahedron[i].stiffness;
             for (to, v) in c.inverse_height.iter_mut().zip(s.tetrahedron[i].inverse_height) {
                 to.0[lane] = v;
@@ -136,22 +144,42 @@ fn length<L: Lanes>(d: L3<L>) -> (L, L) {
     (length, L::splat(1.0) / length)
 }
 
-/// Force that the spring to particle `i - k` exerts on it, over its length, and its block of the tangent.
+/// Pull of the spring to particle `i - k`, and its block of the tangent. `moved` is how much farther the particle has
+/// moved than the other since the origin of velocities.
 #[inline(always)]
-fn spring<L: Lanes, const GEOMETRIC: bool>(model: &NodeModel, k: usize, d: L3<L>) -> (L3<L>, Symmetric<L>) {
+fn spring<L: Lanes, const ROBUST: bool>(
+    model: &NodeModel,
+    node: &NodeAltitude,
+    k: usize,
+    d: L3<L>,
+    moved: L3<L>,
+    rate: L,
+) -> (L3<L>, Symmetric<L>) {
+    let (zero, one) = (L::splat(0.0), L::splat(1.0));
     let stiffness = L::load(&model.stiffness[k - 1]);
     let rest = L::load(&model.length[k - 1]);
     let (length, inverse) = length(d);
-    let force = lanes::scale3(d, stiffness * (length - rest) * inverse);
-    if GEOMETRIC {
-        let across = (rest.neg_mul_add(inverse, L::splat(1.0))).max(L::splat(0.0));
-        let along = across.neg_mul_add(stiffness, stiffness) * inverse * inverse;
+    if ROBUST {
+        let hinge = match k {
+            1 => zero,
+            2 => L::load(&model.bends),
+            _ => one,
+        };
+        let rate = rate * hinge;
+        let stretch = rest.neg_mul_add(inverse, one);
+        // Strain and damping, over the length.
+        let pull = (rate * inverse * inverse).mul_add(lanes::dot(d, moved), stretch);
+        let force = lanes::scale3(d, stiffness * pull);
+        let across = if k < 3 { L::load(&node.pull[k - 1]) } else { stiffness * pull };
+        let across = across.max(L::splat(LOWEST) * L::load(&model.stiffness[2]));
+        let along = (one + rate).mul_add(stiffness, -across) * inverse * inverse;
         let mut m = outer(d, along);
         for q in [0, 2, 5] {
-            m[q] = across.mul_add(stiffness, m[q]);
+            m[q] = m[q] + across;
         }
         (force, m)
     } else {
+        let force = lanes::scale3(d, stiffness * (length - rest) * inverse);
         (force, outer(d, stiffness * inverse * inverse))
     }
 }
@@ -170,20 +198,33 @@ fn altitude<L: Lanes>(node: &NodeAltitude, d: &[L3<L>; 3]) -> ([L; 4], L3<L>, L,
     ([-(w[0] + w[1] + w[2]), w[0], w[1], w[2]], n, inverse, strain)
 }
 
-/// Adds all springs that end at particle `i` to the columns `i - 3 ..= i` and their forces to the right-hand sides:
-/// after it column `i - 3` is complete. Column `i` must have been begun. `GEOMETRIC` as in [`super::plain::tangent`].
+/// How far particle `i` has moved beyond particle `i - k` since the origin of velocities.
 #[inline(always)]
-pub fn add_node<L: Lanes, const GEOMETRIC: bool>(
+fn movement<L: Lanes>(d: L3<L>, base: &[[Pack; 3]], i: usize, k: usize) -> L3<L> {
+    lanes::sub3(d, lanes::sub3(lanes::load3(&base[i]), lanes::load3(&base[i - k])))
+}
+
+/// Adds all springs that end at particle `i` to the columns `i - 3 ..= i` and their forces to the right-hand sides:
+/// after it column `i - 3` is complete. Column `i` must have been begun.
+///
+/// `ROBUST` with damping and geometric terms; without, section 4.1's fixed directions. `base` is the origin of
+/// velocities, `rate` the relaxation time over the time since.
+#[allow(clippy::too_many_arguments)]
+#[inline(always)]
+pub fn add_node<L: Lanes, const ROBUST: bool>(
     i: usize,
     model: &NodeModel,
     node: &NodeAltitude,
     x: &[[Pack; 3]],
+    base: &[[Pack; 3]],
+    rate: L,
     window: &mut Window<L, 3, 12>,
     rhs: &mut [[Pack; 3]],
 ) {
     if i < 3 {
         for k in 1..=i {
-            let (force, m) = spring::<L, GEOMETRIC>(model, k, difference(x, i, k));
+            let d = difference(x, i, k);
+            let (force, m) = spring::<L, ROBUST>(model, node, k, d, movement(d, base, i, k), rate);
             add_diagonal(window, i, &m);
             add_diagonal(window, i - k, &m);
             add_block(window, i, i - k, &m, L::splat(-1.0));
@@ -193,35 +234,92 @@ pub fn add_node<L: Lanes, const GEOMETRIC: bool>(
         return;
     }
     let d = [difference::<L>(x, i, 1), difference(x, i, 2), difference(x, i, 3)];
-    let (w, n, inverse, strain) = altitude(node, &d);
-    let below = (strain - L::splat(HALF)).min(L::splat(0.0));
-    let law = L::splat(FIRM - 1.0).mul_add(below, strain);
-    let firm = L::if_gt(L::splat(HALF), strain, L::splat(FIRM), L::splat(1.0));
-    let gain = L::load(&model.altitude) * L::load(&node.inverse_height);
-    let t = outer(n, gain * L::load(&node.inverse_height) * firm * inverse);
-    // Minus the gradient is -(K law s/h0) w n.
-    let pull = lanes::scale3(n, -(gain * law * inverse.sqrt()));
-    let mut at_i = lanes::scale3(pull, w[0]);
-    let mut own: Symmetric<L> = std::array::from_fn(|q| t[q] * (w[0] * w[0]));
+    let moved = [movement(d[0], base, i, 1), movement(d[1], base, i, 2), movement(d[2], base, i, 3)];
+    let mut own = [L::splat(0.0); 6];
+    let mut at_i = [L::splat(0.0); 3];
     for k in 1..=3 {
-        let (force, m) = spring::<L, GEOMETRIC>(model, k, d[k - 1]);
+        let (force, m) = spring::<L, ROBUST>(model, node, k, d[k - 1], moved[k - 1], rate);
         at_i = lanes::sub3(at_i, force);
-        push(rhs, i - k, lanes::mul_add3(pull, w[k], force));
-        let (square, product) = (w[k] * w[k], w[0] * w[k]);
-        let mut diagonal = m;
-        let mut block = m;
+        push(rhs, i - k, force);
         for q in 0..6 {
             own[q] = own[q] + m[q];
-            diagonal[q] = t[q].mul_add(square, m[q]);
-            block[q] = t[q].mul_add(product, -m[q]);
         }
-        add_diagonal(window, i - k, &diagonal);
-        add_block(window, i, i - k, &block, L::splat(1.0));
+        add_diagonal(window, i - k, &m);
+        add_block(window, i, i - k, &m, L::splat(-1.0));
     }
     add_diagonal(window, i, &own);
     push(rhs, i, at_i);
-    for (k, back) in [(1, 2), (1, 3), (2, 3)] {
-        add_block(window, i - k, i - back, &t, w[k] * w[back]);
+    add_altitude::<L, ROBUST>(i, model, node, &d, &moved, rate, window, rhs);
+}
+
+/// Adds the altitude spring of particles `i - 3 ..= i`, as [`super::plain::tangent`].
+#[allow(clippy::too_many_arguments)]
+#[inline(always)]
+fn add_altitude<L: Lanes, const ROBUST: bool>(
+    i: usize,
+    model: &NodeModel,
+    node: &NodeAltitude,
+    d: &[L3<L>; 3],
+    moved: &[L3<L>; 3],
+    rate: L,
+    window: &mut Window<L, 3, 12>,
+    rhs: &mut [[Pack; 3]],
+) {
+    let (zero, one) = (L::splat(0.0), L::splat(1.0));
+    let (w, n, inverse, strain) = altitude(node, d);
+    let scale = inverse.sqrt();
+    let n = lanes::scale3(n, scale);
+    let below = (strain - L::splat(HALF)).min(zero);
+    let law = L::splat(FIRM - 1.0).mul_add(below, strain);
+    let firm = L::if_gt(L::splat(HALF), strain, L::splat(FIRM), one);
+    let gain = L::load(&model.altitude) * L::load(&node.inverse_height);
+    let slope = gain * L::load(&node.inverse_height) * firm;
+    let mut pull = gain * law;
+    if ROBUST {
+        // The altitude grows by -(w_k n) . moved_k, the weights of all four being 0 in sum.
+        let grown = lanes::mul_add3(moved[0], w[1], lanes::mul_add3(moved[1], w[2], lanes::scale3(moved[2], w[3])));
+        pull = (slope * rate).neg_mul_add(lanes::dot(n, grown), pull);
+    }
+    for k in 0..4 {
+        push(rhs, i - k, lanes::scale3(n, -(pull * w[k])));
+    }
+    if ROBUST {
+        let slope = slope * (one + rate);
+        // Of the strain alone: damping's part would be as often negative as positive.
+        let pull = L::if_gt(strain, L::splat(HALF), gain * law, zero);
+        let face = lanes::load3::<L>(&node.face);
+        let height = -(lanes::dot(d[0], lanes::cross(d[1], d[2])) * scale);
+        let turn = |j: usize, k: usize| {
+            let m = lanes::neg_mul_add3(d[k], face[j], lanes::scale3(d[j], face[k]));
+            lanes::scale3(lanes::cross(n, m), scale)
+        };
+        let (q1, q2, q3) = (turn(1, 2), turn(2, 0), turn(0, 1));
+        let q = [lanes::scale3(lanes::add3(q1, lanes::add3(q2, q3)), -one), q1, q2, q3];
+        for a in 0..4 {
+            for b in a..4 {
+                let along = (pull * height).neg_mul_add(lanes::dot(q[a], q[b]), slope * w[a] * w[b]);
+                // Half of what is along the normal goes with either factor.
+                let left = lanes::neg_mul_add3(q[b], pull * w[a], lanes::scale3(n, along));
+                let right = lanes::scale3(q[a], -(pull * w[b]));
+                let panel = &mut window[(i - b) % RING].0;
+                let first = 3 * (b - a);
+                for r in 0..3 {
+                    for c in 0..if a == b { r + 1 } else { 3 } {
+                        let sum = left[r].mul_add(n[c], panel[first + r][c]);
+                        panel[first + r][c] = n[r].mul_add(right[c], sum);
+                    }
+                }
+            }
+        }
+    } else {
+        let t = outer(n, slope);
+        for k in 0..4 {
+            let m: Symmetric<L> = std::array::from_fn(|q| t[q] * (w[k] * w[k]));
+            add_diagonal(window, i - k, &m);
+            for back in k + 1..4 {
+                add_block(window, i - k, i - back, &t, w[k] * w[back]);
+            }
+        }
     }
 }
 
@@ -249,6 +347,35 @@ fn add_block<L: Lanes>(window: &mut Window<L, 3, 12>, row: usize, column: usize,
         for c in 0..3 {
             panel[first + r][c] = m[AT[r][c]].mul_add(scale, panel[first + r][c]);
         }
+    }
+}
+
+/// The pulls that the tangent takes in an iteration. With `solution`, those to which an iteration from `x` leads by its
+/// own, linear reckoning, where `active`; else those at `x`.
+///
+/// Nodes move along straight lines, so an iteration that turns segments leaves them stretched by half the turn's square,
+/// and the pull of that would make bending appear many times as stiff to the next. The linear one is the force that holds
+/// the length (a Lagrange multiplier's estimate, as in sequential quadratic programming).
+#[inline(always)]
+pub fn pull_node<L: Lanes>(
+    i: usize,
+    model: &NodeModel,
+    node: &mut NodeAltitude,
+    x: &[[Pack; 3]],
+    solution: Option<(&[[Pack; 3]], L)>,
+) {
+    for k in 1..=2.min(i) {
+        let d = difference::<L>(x, i, k);
+        let (_, inverse) = length(d);
+        let mut pull = L::load(&model.length[k - 1]).neg_mul_add(inverse, L::splat(1.0));
+        let mut on = L::splat(1.0);
+        if let Some((solution, active)) = solution {
+            let by = lanes::sub3(lanes::load3::<L>(&solution[i]), lanes::load3(&solution[i - k]));
+            pull = (lanes::dot(d, by) * inverse).mul_add(inverse, pull);
+            on = active;
+        }
+        let slot = &mut node.pull[k - 1];
+        L::if_gt(on, L::splat(0.0), pull * L::load(&model.stiffness[k - 1]), L::load(slot)).store(slot);
     }
 }
 

@@ -130,7 +130,7 @@ impl Kernel for First<'_> {
             lanes::store3(half, &mut scratch.middle[i]);
             lanes::store3(lanes::mul_add3(half, L::splat(2.0), x), &mut scratch.next[i]);
         }
-        limit_strain::<L>(group, &mut scratch.next, settings.strain_limit);
+        limit_strain::<L>(group, &mut scratch.next, settings.strain_limit, L::splat(1.0));
     }
 }
 
@@ -219,7 +219,7 @@ fn solve<L: Lanes>(
                 held.mul_add(way, mass * b).store(&mut rhs[i][c]);
             }
             let model: &NodeModel = &group.model[i];
-            kernel::add_node::<L, false>(i, model, &altitude[i], x, &mut window, rhs);
+            kernel::add_node::<L, false>(i, model, &altitude[i], x, x, L::splat(0.0), &mut window, rhs);
         } else {
             rhs[i] = [Pack::default(); 3];
         }
@@ -237,9 +237,10 @@ fn solve<L: Lanes>(
 
 /// Biased strain limiting (section 4.2): from root to tip, moves the particle farther from the root along the segment so
 /// that its strain is at most `limit` either way. An extra particle is limited along its edge nearer the root. `x` are the
-/// positions that a step would reach; the velocity impulse is what it moves over the time step.
+/// positions that a step would reach; the velocity impulse is what it moves over the time step. Lanes where `due` is 0 stay
+/// as they are, and so does what is within rounding of the limit: limiting twice is limiting once.
 #[inline(always)]
-pub fn limit_strain<L: Lanes>(group: &Group, x: &mut [[Pack; 3]], limit: f64) {
+pub fn limit_strain<L: Lanes>(group: &Group, x: &mut [[Pack; 3]], limit: f64, due: L) {
     if !limit.is_finite() {
         return;
     }
@@ -260,6 +261,8 @@ pub fn limit_strain<L: Lanes>(group: &Group, x: &mut [[Pack; 3]], limit: f64) {
         let allowed = length.min(rest * most).max(rest * least);
         let free = L::if_gt(L::load(&group.held[i]), zero, zero, one);
         let by = (allowed / length - one) * free;
+        let worth = by.max(-by) - L::splat(1e-12);
+        let by = L::if_gt(due, zero, L::if_gt(worth, zero, by, zero), zero);
         lanes::store3(lanes::mul_add3(d, by, at), &mut x[i]);
     }
 }

@@ -148,7 +148,7 @@ impl Kernel for Limit<'_> {
     type Out = Vec<[Pack; 3]>;
     #[inline(always)]
     fn run<L: Lanes>(mut self) -> Self::Out {
-        limit_strain::<L>(self.0, &mut self.1, 0.01);
+        limit_strain::<L>(self.0, &mut self.1, 0.01, L::splat(1.0));
         self.1
     }
 }

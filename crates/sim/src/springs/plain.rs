@@ -7,7 +7,7 @@
 
 use super::calibrate::{Calibration, Section};
 use super::layout::Layout;
-use super::tetrahedron::{CANDIDATES, TINY, largest, volume};
+use super::tetrahedron::{CANDIDATES, TINY, largest, turns, volume};
 use crate::Vec3;
 use nalgebra::Matrix3;
 use pelage_geom::NONE;
@@ -40,6 +40,9 @@ pub const COLINEAR: f64 = 1e-10;
 /// A colinear tetrahedron's last particle is moved off the line by this fraction of the tetrahedron's length, so that the
 /// altitude has a direction, orthogonal to the line.
 pub const NUDGE: f64 = 3e-5;
+
+/// Least `1 - l0 / l` of a bending or torsion spring that its tangent's geometric term follows.
+pub const LOWEST: f64 = -0.5;
 
 /// A length too small for any edge: gives the springs between coincident particles a direction, an axis each.
 pub const COINCIDENT: f64 = 1e-100;
@@ -88,6 +91,8 @@ pub struct Model {
     pub spring: Vec<[Spring; 3]>,
     /// Altitude springs of particles `i - 3 ..= i`.
     pub tetrahedron: Vec<Tetrahedron>,
+    /// Relaxation time of bending and twisting, seconds.
+    pub damping: f64,
 }
 
 impl Model {
@@ -102,6 +107,7 @@ impl Model {
             extra: layout.extra.clone(),
             spring: vec![[Spring::default(); 3]; n],
             tetrahedron: vec![Tetrahedron::default(); n],
+            damping: section.damping,
         };
         for i in 0..n {
             for k in 1..=3.min(i) {
@@ -318,17 +324,19 @@ pub fn gradient(model: &Model, choices: &[Choice], x: &[Vec3]) -> Vec<Vec3> {
 /// Block row `i` of a tangent: blocks `[i][k]` couple particle `i` with `i - k`.
 pub type Tangent = Vec<[Matrix3<f64>; 4]>;
 
-/// Positive semidefinite tangent: of a spring `k/l0 (d d^T + (1 - l0/l)+ (I - d d^T))`, of an altitude spring
-/// `K (s/h0)^2 w w^T n n^T`. Without the geometric term (`geometric` false, section 4.1's fixed directions) tension does
-/// not resist turning.
+/// Tangent. Of a spring `k/l0 (d d^T + a (I - d d^T))` with `a = 1 - l0/l`, at least 0 for edges and [`LOWEST`] for
+/// bending and torsion springs; of an altitude spring `E'' w w^T n n^T + E' h''` ([`turns`]) unless it is below
+/// [`HALF`]. Without the geometric terms (`geometric` false, section 4.1's fixed directions) tension does not resist
+/// turning.
 pub fn tangent(model: &Model, choices: &[Choice], x: &[Vec3], geometric: bool) -> Tangent {
     let mut a = vec![[Matrix3::zeros(); 4]; x.len()];
     for i in 0..x.len() {
         for k in 1..=3.min(i) {
             let s = &model.spring[i][k - 1];
             let (d, length) = direction(x, i, k);
-            let across = if geometric { (1.0 - s.length / length).max(0.0) } else { 0.0 };
-            let m = (d * d.transpose() * (1.0 - across) + Matrix3::identity() * across) * s.stiffness;
+            let least = LOWEST * model.spring[i][2].stiffness;
+            let across = if geometric { (s.stiffness * (1.0 - s.length / length)).max(least) } else { 0.0 };
+            let m = d * d.transpose() * (s.stiffness - across) + Matrix3::identity() * across;
             a[i][0] += m;
             a[i - k][0] += m;
             a[i][k] -= m;
@@ -336,11 +344,17 @@ pub fn tangent(model: &Model, choices: &[Choice], x: &[Vec3], geometric: bool) -
         if i >= 3 {
             let (strain, n, w) = altitude(model, choices, x, i);
             let t = &model.tetrahedron[i];
-            let f = t.inverse_height[choices[i].candidate as usize];
-            let m = n * n.transpose() * (t.stiffness * altitude_law(strain).2 * f * f);
+            let candidate = choices[i].candidate as usize;
+            let f = t.inverse_height[candidate];
+            let (_, first, second) = altitude_law(strain);
+            let pull = if geometric && strain > HALF { t.stiffness * first * f } else { 0.0 };
+            let v = volume(corners(x, i));
+            let (q, h) = (turns(corners(x, i), candidate), v.altitude(candidate).0);
             for k in 0..4 {
                 for back in k..4 {
-                    a[i - k][back - k] += m * (w[k] * w[back]);
+                    let along = t.stiffness * second * f * f * w[k] * w[back] - pull * h * q[k].dot(&q[back]);
+                    let across = q[back] * n.transpose() * w[k] + n * q[k].transpose() * w[back];
+                    a[i - k][back - k] += n * n.transpose() * along - across * pull;
                 }
             }
         }

@@ -135,23 +135,33 @@ fn forces_are_the_gradient_of_the_energy() {
 }
 
 #[test]
-fn at_rest_the_tangent_is_the_hessian() {
-    let s = strand(&helix(5), [End::Free; 2], &hair());
-    let a = tangent(&s.model, &s.choices, &s.x, true);
-    let d = 1e-6 * SEGMENT;
-    for i in 0..s.x.len() {
-        for c in 0..3 {
-            let at = |d: f64| {
-                let mut x = s.x.clone();
-                x[i][c] += d;
-                gradient(&s.model, &s.choices, &x)
-            };
-            let (plus, minus) = (at(d), at(-d));
-            for k in 0..=3.min(i) {
-                for r in 0..3 {
-                    let difference = (plus[i - k][r] - minus[i - k][r]) / (2.0 * d);
-                    let scale = a[i][0].norm();
-                    assert!((difference - a[i][k][(c, r)]).abs() < 1e-5 * scale, "{i} {k}");
+fn the_tangent_is_the_hessian() {
+    // At rest, and bent: segments as long as they were, hinges and altitudes far from rest.
+    for turn in [0.0, 0.1, 0.3] {
+        let mut s = strand(&straight(5), [End::Free; 2], &hair());
+        let mut points = vec![Vec3::zeros()];
+        for i in 0..5 {
+            let (a, b) = (turn * f64::from(i), 0.3 * turn * f64::from(i));
+            let along = Vec3::new(libm::sin(a) * libm::cos(b), -libm::cos(a) * libm::cos(b), libm::sin(b));
+            points.push(points[points.len() - 1] + along * SEGMENT);
+        }
+        s.x = strand(&points, [End::Free; 2], &hair()).x;
+        let a = tangent(&s.model, &s.choices, &s.x, true);
+        let d = 1e-6 * SEGMENT;
+        for i in 0..s.x.len() {
+            for c in 0..3 {
+                let at = |d: f64| {
+                    let mut x = s.x.clone();
+                    x[i][c] += d;
+                    gradient(&s.model, &s.choices, &x)
+                };
+                let (plus, minus) = (at(d), at(-d));
+                for k in 0..=3.min(i) {
+                    for r in 0..3 {
+                        let difference = (plus[i - k][r] - minus[i - k][r]) / (2.0 * d);
+                        let scale = a[i][0].norm();
+                        assert!((difference - a[i][k][(c, r)]).abs() < 1e-7 * scale, "turn {turn}: {i} {k}");
+                    }
                 }
             }
         }
@@ -372,7 +382,8 @@ fn a_groomed_pose_stands() {
         let drift = s.x.iter().zip(&start).fold(0.0_f64, |m, (a, b)| m.max((a - b).norm())) / length;
         println!("{name}: {sagged:?}, drift {drift:e} L");
         assert!(drift < 1e-9, "{name}: {drift:e}");
-        assert_eq!(sagged.factor, 1.0);
+        // The arc turns over sideways, growing by e in 30 ms, unless it is stiffened.
+        assert_eq!(sagged.factor > 1.0, name == "arc 20 cm");
     }
 }
 
@@ -453,6 +464,9 @@ impl Kernel for GroupSolve<'_> {
         for i in 3..n {
             kernel::choose_node::<L>(i, &self.group.candidates[i], &mut altitudes[i], &mut x, L::splat(0.1));
         }
+        for i in 1..n {
+            kernel::pull_node::<L>(i, &self.group.model[i], &mut altitudes[i], &x, None);
+        }
         let mut energy = L::splat(0.0);
         let mut rhs = vec![[Pack::default(); 3]; n + 3];
         let mut factor: Vec<Column<3, 12>> = vec![[[Pack::default(); 3]; 12]; n];
@@ -464,7 +478,7 @@ impl Kernel for GroupSolve<'_> {
                     window[i % RING].0[c][c] = L::load(&self.group.held[i]).mul_add(L::splat(HELD), L::splat(1.0));
                 }
                 let (model, altitude) = (&self.group.model[i], &altitudes[i]);
-                kernel::add_node::<L, true>(i, model, altitude, &x, &mut window, &mut rhs);
+                kernel::add_node::<L, true>(i, model, altitude, &x, &x, L::splat(0.0), &mut window, &mut rhs);
                 energy = energy + kernel::energy_node::<L>(i, model, altitude, &x);
             }
             if i >= 3 {
@@ -528,7 +542,7 @@ fn lanes_do_as_the_plain_model() {
             for i in 0..d.len() {
                 for c in 0..3 {
                     let (a, b) = (found.0[i][c].0[lane], d[i][c]);
-                    assert!((a - b).abs() < 1e-11 * scale, "round {round} lane {lane} particle {i}: {a:e} {b:e}");
+                    assert!((a - b).abs() < 1e-10 * scale, "round {round} lane {lane} particle {i}: {a:e} {b:e}");
                 }
             }
             assert!((found.3.0[lane] / e - 1.0).abs() < 1e-11);

@@ -58,6 +58,19 @@ impl Volume {
     }
 }
 
+/// How a candidate's direction turns: it changes by `-q_j (n . dx_j)` as vertex `j` moves, so the altitude's second
+/// derivative in vertices `i` and `j` is `-(w_i q_j n^T + w_j n q_i^T + h (q_i . q_j) n n^T)`.
+pub fn turns(x: [Vec3; 4], candidate: usize) -> [Vec3; 4] {
+    let e: [Vec3; 3] = [x[1] - x[0], x[2] - x[0], x[3] - x[0]];
+    let c = chosen(candidate);
+    let area = volume(x).area(candidate);
+    let inverse = 1.0 / (area.norm_squared() + TINY);
+    // d(u x v) = sum de_j x m_j with m_j in the plane of u and v.
+    let turn = |j: usize, k: usize| area.cross(&(e[k] * c[j] - e[j] * c[k])) * inverse;
+    let q = [turn(1, 2), turn(2, 0), turn(0, 1)];
+    [-(q[0] + q[1] + q[2]), q[0], q[1], q[2]]
+}
+
 /// Largest `u x v`, the first unless a later one is larger by 2 %: a straight hair's largest two are equal, and rounding
 /// must not choose between them.
 pub fn largest(areas_squared: &[f64; CANDIDATES]) -> usize {

@@ -28,7 +28,7 @@ pub fn in_vacuum() -> Material {
 }
 
 /// Models that the tests of physics are run with.
-pub const MODELS: [Model; 1] = [Model::Rod];
+pub const MODELS: [Model; 2] = [Model::Rod, Model::Springs];
 
 /// Size of gravity in the tests, metres per second squared.
 pub const G: f64 = 9.81;
@@ -91,6 +91,7 @@ pub fn placed_turned(p: [f64; 3], axis: Vec3, angle: f64) -> Root {
 /// Hairs in a simulation, with the roots where they were groomed.
 #[derive(Clone)]
 pub struct Shot {
+    pub model: Model,
     pub sim: Simulation,
     pub started: Started,
     pub roots: Vec<Root>,
@@ -109,7 +110,7 @@ impl Shot {
         let (sim, started) = Simulation::new(&hairs_in, settings, gravity).unwrap();
         let roots = hairs.iter().map(|h| placed(h[0])).collect();
         let tips = (settings.tip != End::Free).then(|| hairs.iter().map(|h| placed(h[h.len() - 1])).collect());
-        Shot { sim, started, roots, tips, gravity, time: 0.0, last: SpanReport::default() }
+        Shot { model: settings.model, sim, started, roots, tips, gravity, time: 0.0, last: SpanReport::default() }
     }
 
     /// Hairs whose natural shape is `natural`, at rest but in the pose `pose`, not relaxed.
