@@ -46,10 +46,9 @@ const CONTACT_TOLERANCE: f64 = 1e-2;
 /// Iterations in which friction follows; in later ones it stays, so that they converge. With few, sliding begins late.
 const FRICTION_ITERATIONS: usize = 6;
 
-/// The first iteration counts as well converged if it turns less than the root of this times the tolerance, radians. What
-/// it leaves is far below the tolerance, but in every step of the same sign, and feeds energy: with 5e-5, undamped hair
-/// gains 2e-3 of it in 1e5 steps at the default tolerance; below 1e-6, calm hair iterates twice for nothing.
-const FIRST_TURN: f64 = 1e-5;
+/// The first iteration counts as well converged if it turns less than the root of this times the tolerance, radians: what the
+/// guess from the last acceleration leaves. Larger, errors of fast motion stay; smaller, calm hair iterates twice.
+const FIRST_TURN: f64 = 0.05;
 
 /// Slowest convergence that is believed.
 const SLOWEST: f64 = 0.9;

@@ -617,6 +617,11 @@ mod tests {
         let mut scratch = Scratch::<4, 11>::default();
         scratch.reserve(3);
         let at: Vec<[Pack; 3]> = motion.iter().map(|m| m.x).collect();
+        for i in 0..2 {
+            let edge = edge::<Plain>(load3(&at[i]), load3(&at[i + 1]));
+            let (rest, stretch) = (Plain::load(&model.0[i].length), Plain::load(&model.1[i].stretch));
+            (stretch * (edge.length - rest)).store(&mut scratch.pull[i]);
+        }
         let turned = [Pack::default(); 3];
         let mut run = |eliminate: bool| {
             let mut stage = Stage {
