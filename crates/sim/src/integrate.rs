@@ -180,7 +180,10 @@ pub fn advance<A: Around>(
     if now.contains(&true) {
         let saved = save(g, work, depth);
         let converged = step(g, around, method, at, now, &saved.motion, work, done);
-        let seen = look(g, method, &saved.motion);
+        let mut seen = look(g, method, &saved.motion);
+        for l in (0..LANES).filter(|&l| now[l]) {
+            seen.strain.0[l] = seen.strain.0[l].max(axis_strain(g, l));
+        }
         let (mut long, mut halted) = ([false; LANES], [false; LANES]);
         for l in 0..LANES {
             let finite = seen.finite.0[l] == 0.0;
@@ -236,6 +239,17 @@ pub fn advance<A: Around>(
             advance(g, around, method, Interval { start, length: half, ..at }, deeper, depth + 1, work, done);
         }
     }
+}
+
+/// Largest strain of the axis of springs, which may pass between particles beside it.
+fn axis_strain(g: &Group, l: usize) -> f64 {
+    let Some(springs) = &g.springs else { return 0.0 };
+    let strain = |w: &[u32]| {
+        let (a, b) = (w[0] as usize, w[1] as usize);
+        let rest = springs.model.model[b].length[b - a - 1].0[l];
+        if g.node[b].held.0[l] == 0.0 { ((g.x(b, l) - g.x(a, l)).norm() / rest - 1.0).abs() } else { 0.0 }
+    };
+    g.at[l].windows(2).map(strain).fold(0.0, f64::max)
 }
 
 /// Strain limiting from root to tip (the springs paper's section 4.2): only the node farther from the root moves, along the

@@ -30,7 +30,8 @@ impl<const D: usize, const ROWS: usize> Kernel for Iterate<'_, '_, D, ROWS> {
         } else {
             rod::solve::<L, D, ROWS>(&g.node, &g.elastic, &g.motion, turned, damping, &mut stage, scratch);
         }
-        let largest = rod::apply::<L, D, ROWS>(&g.node, Some(&g.elastic), &mut g.motion, turned, &stage.active, scratch);
+        let largest =
+            rod::apply::<L, D, ROWS>(&g.node, Some(&g.elastic), &mut g.motion, turned, &stage.active, scratch);
         let mut out = Pack::default();
         largest.store(&mut out);
         out
