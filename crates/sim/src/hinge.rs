@@ -190,7 +190,8 @@ pub(crate) fn second<L: Lanes>(e0: &Edge<L>, e1: &Edge<L>, sigma: L3<L>, moment:
     let behind = mul_add3(t1, bend, cross(s, t1));
     let star = [[bend, -s[2], s[1]], [s[2], bend, -s[0]], [-s[1], s[0], bend]];
     let (i00, i01, i11) = (e0.inverse * e0.inverse, e0.inverse * e1.inverse, e1.inverse * e1.inverse);
-    let mut out = Blocks { aa: [[zero; 3]; 3], ab: [[zero; 3]; 3], bb: [[zero; 3]; 3] };
+    // Every entry is set below; zeros here would become a call of memset.
+    let mut out = Blocks { aa: [[half; 3]; 3], ab: [[half; 3]; 3], bb: [[half; 3]; 3] };
     for x in 0..3 {
         for y in 0..3 {
             if y <= x {
