@@ -4,6 +4,8 @@ use crate::mesh::corners;
 use crate::{NONE, SurfacePoint, Topology, Vec3};
 use rayon::prelude::*;
 
+mod lids;
+
 /// Triangles per leaf. With 1 the hierarchy doubles and building takes longer; from 8 up queries test more triangles
 /// than boxes they save.
 const LEAF: usize = 4;
@@ -55,6 +57,10 @@ pub struct Bvh {
     vertex_normal: Vec<[f32; 3]>,
     /// Vertices on an open or non-manifold edge.
     open: Vec<bool>,
+    /// Triangles from this one on are lids of holes, see [`Bvh::with_lids`].
+    lids: u32,
+    /// Vertices of lids.
+    rim: Vec<bool>,
 }
 
 /// Two children, side by side in one cache line.
@@ -128,6 +134,8 @@ impl Bvh {
             triangle: renumbered,
             vertex_normal,
             open,
+            lids: NONE,
+            rim: Vec::new(),
         }
     }
 
@@ -181,6 +189,11 @@ impl Bvh {
     /// mesh. No ray slips through an edge that two triangles share (Woop, Benthin, Wald 2013, "Watertight Ray/Triangle
     /// Intersection"). Ties go to the lowest triangle.
     pub fn ray(&self, origin: Vec3, direction: Vec3, max_t: f64) -> Option<(f64, SurfacePoint)> {
+        self.first_hit(origin, direction, max_t).map(|(t, slot, weight)| (t, surface_point(self.index[slot], weight)))
+    }
+
+    /// What [`Bvh::ray`] finds: t, place in the order of the leaves, weights of corners 1 and 2.
+    fn first_hit(&self, origin: Vec3, direction: Vec3, max_t: f64) -> Option<(f64, usize, [f64; 2])> {
         let shear = Shear::new(origin, direction)?;
         let inverse = direction.map(|d| 1.0 / d);
         let mut best: Option<(usize, [f64; 2])> = None;
@@ -214,7 +227,7 @@ impl Bvh {
             }
             loop {
                 if depth == 0 {
-                    return best.map(|(slot, weight)| (reach, surface_point(self.index[slot], weight)));
+                    return best.map(|(slot, weight)| (reach, slot, weight));
                 }
                 depth -= 1;
                 if stack[depth].far <= reach {
@@ -249,7 +262,8 @@ impl Bvh {
             .find_map(|v| v.try_normalize(1e-6))
             .or_else(|| away.try_normalize(0.0))
             .unwrap_or_else(Vec3::y);
-        let inside = !open && away.dot(&normal) < 0.0;
+        let inside =
+            !open && away.dot(&normal) < 0.0 && (!self.is_on_lid(slot, hit.feature) || self.is_behind(query, away));
         let distance = hit.square.sqrt();
         Closest {
             point: match hit.feature {

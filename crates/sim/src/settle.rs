@@ -20,6 +20,10 @@ use crate::stage::Stage;
 /// Stiffness doubles at most this often: 64 times.
 const DOUBLINGS: u32 = 6;
 
+/// Halvings of the last doubling (in the logarithm) that find the factor that is needed: to a tenth, 2^(1/8). Each costs
+/// as much as a doubling; with fewer, hair is up to a half stiffer than it must be.
+const HALVINGS: u32 = 3;
+
 /// Step of the differences, in lengths of an edge and radians. Rounding shows below 1e-7, curvature above 1e-4.
 const DIFFERENCE: f64 = 1e-5;
 
@@ -62,23 +66,7 @@ pub fn prepare(strands: &[Strand], settings: &Settings, gravity: [f64; 3]) -> (G
     };
     settle(&mut group);
     if sag_free && g > 0.0 {
-        let mut factor = [1.0; LANES];
-        let mut wrong = unstable(&group, width);
-        for _ in 0..DOUBLINGS {
-            let lanes: Vec<usize> = (0..LANES).filter(|&l| group.strand[l].is_some() && wrong[l]).collect();
-            if lanes.is_empty() {
-                break;
-            }
-            for l in lanes {
-                factor[l] *= 2.0;
-                for e in &mut group.elastic {
-                    e.bend.0[l] *= 2.0;
-                    e.twist.0[l] *= 2.0;
-                }
-            }
-            settle(&mut group);
-            wrong = unstable(&group, width);
-        }
+        let (factor, wrong) = stiffen(&mut group, width, settle);
         for l in 0..LANES {
             if let Some(s) = group.strand[l].filter(|_| factor[l] > 1.0) {
                 figures.stiffened.push((s, if wrong[l] { 0.0 } else { factor[l] }));
@@ -86,6 +74,55 @@ pub fn prepare(strands: &[Strand], settings: &Settings, gravity: [f64; 3]) -> (G
         }
     }
     (group, figures)
+}
+
+/// Stiffens strands until they can stand; factors, and which still can't. `settle` finds natural shapes.
+fn stiffen(group: &mut Group, width: Width, settle: impl Fn(&mut Group)) -> ([f64; LANES], [bool; LANES]) {
+    let mut factor = [1.0; LANES];
+    let mut wrong = unstable(group, width);
+    for l in (0..LANES).filter(|&l| group.strand[l].is_none()) {
+        wrong[l] = false;
+    }
+    let mut set = |lanes: &[bool; LANES], by: [f64; LANES]| {
+        for l in (0..LANES).filter(|&l| lanes[l]) {
+            factor[l] *= by[l];
+            for e in &mut group.elastic {
+                e.bend.0[l] *= by[l];
+                e.twist.0[l] *= by[l];
+            }
+        }
+        settle(group);
+        (factor, unstable(group, width))
+    };
+    let was_wrong = wrong;
+    for _ in 0..DOUBLINGS {
+        if !wrong.contains(&true) {
+            break;
+        }
+        let found = set(&wrong, [2.0; LANES]).1;
+        wrong = std::array::from_fn(|l| wrong[l] && found[l]);
+    }
+    // Back by halves of what was too much, and on again where that was too far.
+    let search: [bool; LANES] = std::array::from_fn(|l| was_wrong[l] && !wrong[l]);
+    let mut down = search;
+    let mut step = 0.5;
+    for k in 0..HALVINGS {
+        if !search.contains(&true) {
+            break;
+        }
+        let by = down.map(|down| libm::exp2(if down { -step } else { step }));
+        let found = set(&search, by).1;
+        down = found.map(|wrong| !wrong);
+        step *= 0.5;
+        if k + 1 == HALVINGS {
+            // The last that is known to stand.
+            let low: [bool; LANES] = std::array::from_fn(|l| search[l] && !down[l]);
+            if low.contains(&true) {
+                set(&low, [libm::exp2(2.0 * step); LANES]);
+            }
+        }
+    }
+    (factor, wrong)
 }
 
 /// Particles of a strand of springs; `None` where a segment is far shorter than the others.

@@ -75,7 +75,7 @@ impl Surface {
     /// Of a solid whose mesh has its vertices at `position`, metres.
     fn new(solid: &Closed, position: &[[f64; 3]]) -> Self {
         let position = solid.extend(position);
-        let bvh = Bvh::build(&position, &solid.mesh.triangle, &solid.topology);
+        let bvh = solid.bvh(&position);
         Surface { position, bvh }
     }
 

@@ -514,7 +514,10 @@ fn note(run: &mut Runner<'_>, layer: &str, frame: i64, r: &SpanReport, counts: &
     };
     most(SLEEPING, r.sleeping);
     most("points that the exact mesh pushed out", r.corrected);
-    most("deepest point, micrometres", (r.deepest * 1e6).round() as u64);
+    // In the pre-roll points that the groom put inside come out.
+    if frame >= i64::from(run.project.shot.value.shot.frames[0]) {
+        most("deepest point, micrometres", (r.deepest * 1e6).round() as u64);
+    }
     most("strands that took steps of their own", r.subdivided);
     most("largest strain, millionths", (r.largest_strain * 1e6).round() as u64);
     let values = [r.particle_steps, r.teleported, r.held.len() as u64, r.bad_roots.len() as u64];

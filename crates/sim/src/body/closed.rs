@@ -1,7 +1,7 @@
 //! Meshes with their holes closed.
 
 use crate::Vec3;
-use pelage_geom::{Mesh, NONE, Topology};
+use pelage_geom::{Bvh, Mesh, NONE, Topology};
 
 /// A hole is closed if its lid has at most this share of the mesh's area. A hemisphere's has half and makes a solid; a
 /// sheet's has all of it and would lie on the sheet, so that sheets stay open.
@@ -45,6 +45,14 @@ impl Closed {
         closed.mesh.face.clear();
         closed.topology = Topology::new(&closed.mesh);
         closed
+    }
+
+    /// Hierarchy over a pose: `position` of the vertices with those of the lids' middles, as [`Closed::extend`] makes
+    /// them. Where a lid cuts through the mesh, what lies behind it outside is outside.
+    pub fn bvh(&self, position: &[[f64; 3]]) -> Bvh {
+        let lids = self.rim.iter().map(Vec::len).sum::<usize>();
+        let bvh = Bvh::build(position, &self.mesh.triangle, &self.topology);
+        if lids == 0 { bvh } else { bvh.with_lids(self.mesh.triangle.len() - lids, &self.topology) }
     }
 
     /// Values by vertex (positions, velocities) of the mesh with those of the lids' middles after them.
