@@ -76,7 +76,7 @@ pub(super) mod version {
     pub const ROOTS: u32 = 1;
     pub const WEIGHTS: u32 = 1;
     pub const COLUMN: u32 = 1;
-    pub const SIMULATE: u32 = 3;
+    pub const SIMULATE: u32 = 4;
     pub const INTERPOLATE: u32 = 1;
     pub const EXPORT: u32 = 1;
     pub const PREVIEW: u32 = 2;
