@@ -10,13 +10,13 @@ use std::time::Instant;
 fn main() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     pool.install(|| {
-        for (hairs, wide) in [(64, true), (64, false), (4096, true)] {
-            measure(hairs, 50, wide);
+        for (hairs, curve, wide) in [(64, 0.3, true), (64, 0.3, false), (4096, 0.3, true), (4096, 0.0, true)] {
+            measure(hairs, 50, curve, wide);
         }
     });
 }
 
-fn measure(count: usize, segments: usize, wide: bool) {
+fn measure(count: usize, segments: usize, curve: f64, wide: bool) {
     let mut position = Vec::new();
     let mut roots = Vec::new();
     let id: Vec<u64> = (0..count as u64).collect();
@@ -25,7 +25,7 @@ fn measure(count: usize, segments: usize, wide: bool) {
         roots.push(Root { position: [0.0, 0.0, z], rotation: [0.0, 0.0, 0.0, 1.0] });
         for i in 0..=segments {
             let s = 0.2 * i as f64 / segments as f64;
-            position.push([s, -0.3 * s * s, z]);
+            position.push([s, -curve * s * s, z]);
         }
     }
     let offsets = Offsets::uniform(count, segments + 1);
@@ -64,6 +64,6 @@ fn measure(count: usize, segments: usize, wide: bool) {
         ratio = r.particle_solves as f64 / r.particle_steps as f64;
     }
     println!(
-        "{count} hairs x {segments}, wide {wide}: {best:.1} ns a node and step, {solve:.1} a node and solve; {ratio:.2} solves a step"
+        "{count} hairs x {segments}, curved by {curve}, wide {wide}: {best:.1} ns a node and step, {solve:.1} a node and solve; {ratio:.2} solves a step"
     );
 }
