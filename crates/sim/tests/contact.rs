@@ -77,6 +77,30 @@ fn hair_on_a_shaking_ball_stays_outside() {
     }
 }
 
+#[test]
+fn hair_in_contact_moves_as_if_it_were_alone() {
+    let radius = 0.09;
+    let b = ball(radius);
+    // Some lie on the ball, some stand off, and lengths differ.
+    let hairs: Vec<Vec<[f64; 3]>> = (0..11)
+        .map(|k| tuft(radius, 11, 0.05 + 0.015 * f64::from(k), 12 + 2 * k as usize)[k as usize].clone())
+        .collect();
+    let play = |hairs: &[Vec<[f64; 3]>], wide: bool| {
+        let mut shot = Shot::new(hairs, &Settings { wide, ..Settings::default() }, GRAVITY);
+        for frame in 0..6 {
+            let motion = move |f: f64| turned(Vec3::new(0.2, 1.0, 0.0), libm::sin(0.8 * (f64::from(frame) + f)));
+            let part = Part { motion: &motion, shape: Shape::Field(&b.field), exact: None };
+            shot.go(1.0 / 24.0, &motion, &Body { parts: vec![part], seconds: 1.0 / 24.0 }, None);
+        }
+        shot
+    };
+    let together = play(&hairs, true);
+    assert_eq!(together.sim.save(), play(&hairs, false).sim.save());
+    for (h, hair) in hairs.iter().enumerate() {
+        assert_eq!(together.hair(h), play(std::slice::from_ref(hair), true).hair(0), "hair {h}");
+    }
+}
+
 /// A long thin ellipsoid stands for a cylinder about z.
 fn drum(radius: f64) -> Ellipsoid {
     let mesh = shapes::cube_sphere(12, 1.0);
