@@ -2,7 +2,7 @@
 //!
 //! The steps themselves are in [`crate::springs::paper`]; here they get held ends, body collisions (step 5) and time. The
 //! step is the paper's 6e-4 s unless a number of steps is asked for; there is no subdivision, so fast motion may blow up
-//! as it does in print: such strands are held and reported.
+//! as it does in print: such strands are held and reported. There is gravity and the body, no air and no internal damping.
 
 use crate::Vec3;
 use crate::body::Instant;
@@ -14,6 +14,10 @@ use crate::springs::paper::{self, Drive, Scratch, Settings, State};
 
 /// The paper's typical step, seconds.
 pub const STEP: f64 = 6e-4;
+
+/// A strand longer than its rest by this much of it has blown up, and is held. Half of it happens in fast motion and comes
+/// back; ten times does not.
+const BLOWN_UP: f64 = 1.0;
 
 /// What does not change over a span.
 pub struct Span<'a> {
@@ -75,6 +79,8 @@ pub fn advance<A: Around>(g: &mut Group, around: &A, span: &Span<'_>, lanes: [bo
             let long: f64 = g.at[l].windows(2).map(edge).sum();
             let all: f64 = g.at[l].iter().map(|&i| g.node[i as usize].share.0[l]).sum();
             done.strain[l] = (long / all - 1.0).abs();
+            // Blown up, if still in numbers.
+            done.failed[l] = done.strain[l] > BLOWN_UP;
         }
     }
 }

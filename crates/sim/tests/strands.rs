@@ -90,3 +90,41 @@ fn a_violent_shake_stays_bounded_at_every_step() {
         }
     }
 }
+
+#[test]
+fn the_papers_nine_steps_run_in_a_shot() {
+    // Let go level and at rest: in a tenth of a second rods and springs have hardly parted.
+    let level: Vec<[f64; 3]> = (0..=20).map(|i| [0.005 * f64::from(i), 0.0, 0.0]).collect();
+    let fall = |model| {
+        let settings = Settings { model, sag_free: false, material: common::in_vacuum(), ..Settings::default() };
+        let mut shot = Shot::new(std::slice::from_ref(&level), &settings, GRAVITY);
+        shot.steps(3, 1.0 / 24.0);
+        assert!(shot.last.held.is_empty());
+        shot.tip(0)
+    };
+    let (paper, rod) = (fall(Model::Paper), fall(Model::Rod));
+    println!("{paper:?} {rod:?}");
+    assert!(rod.y < -0.02 && (paper - rod).norm() < 0.01);
+    // Curls have flat tetrahedra that bear no load: stiffened within bounds, and never longer than twice themselves.
+    let curls: Vec<Vec<[f64; 3]>> = (0..6)
+        .map(|k| {
+            let at = |i: i32| {
+                let s = 0.2 * f64::from(i) / 40.0;
+                let turn = 100.0 * s + f64::from(k);
+                [0.004 * libm::sin(turn), -s * (0.2 * f64::from(k) - 0.5), 0.004 * libm::cos(turn) + 0.5 * s]
+            };
+            (0..=40).map(at).collect()
+        })
+        .collect();
+    let settings = Settings { model: Model::Paper, ..Settings::default() };
+    let mut shot = Shot::new(&curls, &settings, GRAVITY);
+    assert!(shot.started.stiffened.iter().all(|s| s.factor <= 64.0), "{:?}", shot.started.stiffened);
+    for _ in 0..12 {
+        shot.wait(1.0 / 24.0);
+        for (h, curl) in curls.iter().enumerate() {
+            let long = |p: &[Vec3]| p.windows(2).map(|w| (w[1] - w[0]).norm()).sum::<f64>();
+            let natural: Vec<Vec3> = curl.iter().map(|p| Vec3::from(*p)).collect();
+            assert!(long(&shot.hair(h)) <= 2.001 * long(&natural), "hair {h}");
+        }
+    }
+}

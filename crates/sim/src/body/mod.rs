@@ -161,7 +161,13 @@ impl Instant<'_, '_> {
     /// The nearest of the parts' surfaces (deepest, where a point is inside of several): distance, normal, velocity with
     /// that of the rigid motion, in the world. Infinitely far without parts.
     pub fn sample(&self, p: Vec3) -> Hit {
+        self.nearest(p).0
+    }
+
+    /// [`Instant::sample`], and whether that surface is a shape that only stands for a mesh: groomed hair may be in it.
+    pub fn nearest(&self, p: Vec3) -> (Hit, bool) {
         let mut nearest = Hit { distance: f64::INFINITY, normal: Vec3::y(), velocity: Vec3::zeros() };
+        let mut stands_for = false;
         for (part, placed) in self.body.parts.iter().zip(&self.placed) {
             let local = placed.invert(p);
             if nearest.distance < f64::INFINITY && part.shape.distance_bound(local, self.alpha) > nearest.distance {
@@ -170,9 +176,10 @@ impl Instant<'_, '_> {
             let hit = part.shape.sample(local, self.alpha);
             if hit.distance < nearest.distance {
                 nearest = placed.into_world(local, hit);
+                stands_for = matches!(part.shape, Shape::Table(_) | Shape::Ellipsoid(_));
             }
         }
-        nearest
+        (nearest, stands_for)
     }
 
     /// A lower bound of the distance where the point is outside, zero or less inside; cheaper than [`Instant::sample`].

@@ -17,8 +17,8 @@ use nalgebra::Matrix3;
 /// spring's stiffness gone; at 0.1 a straight horizontal hair of 15 cm would be stiffened already (20 cm: 0.27).
 pub const LIMIT: f64 = 0.5;
 
-/// Stiffness doubles at most this often for a pose to stand: 64 times.
-const DOUBLINGS: u32 = 6;
+/// Stiffest that a strand is made for its pose to stand, as for rods. Hair that would need more keeps some of its sag.
+const STIFFEST: f64 = 64.0;
 
 /// Springs as they are under load.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,21 +62,23 @@ pub fn without_sag(model: &mut Model, x: &[Vec3], gravity: Vec3) -> Option<Sagge
             load = load.max(t[k - 1].abs() / (spring.stiffness * spring.length));
         }
     }
-    let mut factor = (load / LIMIT).max(1.0);
+    let mut factor = (load / LIMIT).clamp(1.0, STIFFEST);
     let choices = model.choices();
     let natural = model.clone();
-    for doubling in 0..=DOUBLINGS {
+    loop {
         for i in 3..n {
             for k in 1..=3 {
                 let was = natural.spring[i][k - 1];
                 let constant = was.stiffness * was.length * if hinge(i, k) { factor } else { 1.0 };
                 let l = (x[i] - x[i - k]).norm();
-                let length = l * constant / (constant + tension[i][k - 1]);
+                // A spring bears no more than leaves it a rest length.
+                let most = LIMIT * constant;
+                let length = l * constant / (constant + tension[i][k - 1].clamp(-most, most));
                 model.spring[i][k - 1] = Spring { stiffness: constant / length, length };
             }
             model.tetrahedron[i].stiffness = natural.tetrahedron[i].stiffness * factor;
         }
-        if doubling == DOUBLINGS || stands(model, &choices, x) {
+        if 2.0 * factor > STIFFEST || stands(model, &choices, x) {
             break;
         }
         factor *= 2.0;

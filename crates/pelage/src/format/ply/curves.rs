@@ -27,6 +27,8 @@ pub struct Curves {
 const CURVE_ELEMENTS: [&str; 5] = ["hair", "strand", "curve", "polyline", "edge"];
 /// The comment that carries the point that positions are relative to in memory.
 const ORIGIN: &str = "origin";
+/// First comment of our own files.
+const MARK: &str = "pelage hair 1";
 
 /// Writes one frame of hair: element `vertex` with `x y z` (scene units), velocities `vx vy vz` (scene units a second)
 /// and `width` (diameter, scene units), element `hair` with the range of its points (`first`, `count`), `id_lo`,
@@ -71,7 +73,7 @@ fn check_sizes(path: &Path, layers: &[HairLayer], frame: &[HairFrame<'_>]) -> Re
 
 fn comments(facts: &ShotFacts, layers: &[HairLayer]) -> Vec<String> {
     let mut lines = vec![
-        "pelage hair 1".to_owned(),
+        MARK.to_owned(),
         format!("shot {}", facts.name),
         format!("meters_per_unit {}", facts.meters_per_unit),
         format!("up {}", facts.up),
@@ -423,8 +425,8 @@ fn assemble(
     Ok(out)
 }
 
-/// The origin that the comments name; else, for curves that are far from the scene's origin for their size, the middle
-/// of their box in whole units; else zero.
+/// The origin that the comments name; zero for our own files that name none; else, for curves that are far from the scene's
+/// origin for their size, the middle of their box in whole units; else zero.
 fn origin(comments: &[String], position: &[[f64; 3]]) -> [f64; 3] {
     let parse = |c: &String| {
         let mut words =
@@ -434,6 +436,9 @@ fn origin(comments: &[String], position: &[[f64; 3]]) -> [f64; 3] {
     };
     if let Some(found) = comments.iter().find_map(parse) {
         return found;
+    }
+    if comments.iter().any(|c| c == MARK) {
+        return [0.0; 3];
     }
     let Some(first) = position.first() else { return [0.0; 3] };
     let (lo, hi) = position.iter().fold((*first, *first), |(lo, hi): ([f64; 3], [f64; 3]), p| {
