@@ -106,7 +106,7 @@ fn drum(radius: f64) -> Ellipsoid {
     let mesh = shapes::cube_sphere(12, 1.0);
     let stretched: Vec<[f64; 3]> =
         mesh.position.iter().map(|p| [p[0] * radius, p[1] * radius, p[2] * 1000.0 * radius]).collect();
-    Ellipsoid::fit(&stretched).unwrap().around(&stretched)
+    Ellipsoid::fit(&stretched, &mesh.triangle).unwrap().around(&stretched)
 }
 
 /// Length that hangs on the far side of a drum when a string of weight w just slips: T' = mu (T + w R sin a) + w R cos a

@@ -137,7 +137,7 @@ pub(super) fn colliders(
                 let surface = Surface::new(&solid, &rest);
                 let stand = match b.kind {
                     BodyKind::Field => Stand::Field(surface.field(&solid, &settings, region)),
-                    BodyKind::Ellipsoid => Stand::Ellipsoid(ellipsoid(&surface)),
+                    BodyKind::Ellipsoid => Stand::Ellipsoid(ellipsoid(&solid, &surface)),
                     kind => Stand::Table(table(&surface, kind, in_metres(b.axis), up)),
                 };
                 note_rays(run, "the skin", &stand);
@@ -152,7 +152,7 @@ pub(super) fn colliders(
         let surface = Surface::new(&solid, &metres(&read.mesh.position, unit));
         let stand = match mesh.kind {
             BodyKind::Field => Stand::Field(surface.field(&solid, &settings, None)),
-            BodyKind::Ellipsoid => Stand::Ellipsoid(ellipsoid(&surface).around(&surface.position)),
+            BodyKind::Ellipsoid => Stand::Ellipsoid(ellipsoid(&solid, &surface).around(&surface.position)),
             kind => Stand::Table(table(&surface, kind, in_metres(mesh.axis), up)),
         };
         note_rays(run, &mesh.file.label, &stand);
@@ -164,9 +164,9 @@ pub(super) fn colliders(
 }
 
 /// A mesh without a single finite vertex is a point at the origin.
-fn ellipsoid(surface: &Surface) -> Ellipsoid {
+fn ellipsoid(solid: &Closed, surface: &Surface) -> Ellipsoid {
     let nothing = Ellipsoid { placement: Rigid::default(), semi_axes: [0.0; 3] };
-    Ellipsoid::fit(&surface.position).unwrap_or(nothing)
+    Ellipsoid::fit(&surface.position, &solid.mesh.triangle).unwrap_or(nothing)
 }
 
 /// A mesh with its holes closed.

@@ -21,17 +21,37 @@ pub struct Ellipsoid {
 }
 
 impl Ellipsoid {
-    /// Ellipsoid of the points' inertia: centre and axes are those of their second moments, semi-axes the square roots
-    /// of three times these, which is right where the points are the image of an even sphere. Points lie on both sides
-    /// of it; [`Ellipsoid::around`] bounds them. `None` without finite points.
-    pub fn fit(position: &[[f64; 3]]) -> Option<Self> {
+    /// Ellipsoid of the solid's inertia: centre and axes are those of its volume's second moments, semi-axes the square
+    /// roots of five times these, which is right for an ellipsoid however its surface is cut into triangles. Where the mesh
+    /// holds no volume it is that of the points: three times, right for the image of an even sphere. The surface lies on both
+    /// sides of it; [`Ellipsoid::around`] bounds it. `None` without finite points.
+    pub fn fit(position: &[[f64; 3]], triangle: &[[u32; 3]]) -> Option<Self> {
         let points = || position.iter().filter(|p| p.iter().all(|x| x.is_finite())).map(|p| Vec3::from(*p));
         let n = points().count() as f64;
         if n == 0.0 {
             return None;
         }
-        let mean = points().fold(Vec3::zeros(), |s, p| s + p) / n;
-        let second = points().fold(Matrix3::zeros(), |s, p| s + (p - mean) * (p - mean).transpose()) / n;
+        let middle = points().fold(Vec3::zeros(), |s, p| s + p) / n;
+        let outer = |v: Vec3| v * v.transpose();
+        // Tetrahedra from the middle to every triangle; sums of 1, x and x x^T over their volume.
+        let (mut volume, mut first, mut second) = (0.0, Vec3::zeros(), Matrix3::zeros());
+        for t in triangle {
+            let [a, b, c] = t.map(|v| Vec3::from(position[v as usize]) - middle);
+            let piece = a.dot(&b.cross(&c)) / 6.0;
+            if piece.is_finite() {
+                let sum = a + b + c;
+                volume += piece;
+                first += sum * (piece / 4.0);
+                second += (outer(sum) + outer(a) + outer(b) + outer(c)) * (piece / 20.0);
+            }
+        }
+        let radius = points().map(|p| (p - middle).norm()).fold(0.0, f64::max);
+        let (mean, second, times) = if volume.abs() > 1e-6 * radius * radius * radius {
+            let mean = first / volume;
+            (middle + mean, second / volume - outer(mean), 5.0)
+        } else {
+            (middle, points().fold(Matrix3::zeros(), |s, p| s + outer(p - middle)) / n, 3.0)
+        };
         let (value, vector) = eigen::symmetric([0, 1, 2].map(|i| [0, 1, 2].map(|j| second[(i, j)])));
         let [x, y, z] = vector.map(Vec3::from);
         let z = if x.cross(&y).dot(&z) < 0.0 { -z } else { z };
@@ -39,7 +59,7 @@ impl Ellipsoid {
             UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, y, z])));
         let c = turn.coords;
         let placement = Rigid { rotation: [c.x, c.y, c.z, c.w], translation: mean.into() };
-        Some(Ellipsoid { placement, semi_axes: value.map(|v| (3.0 * v.max(0.0)).sqrt()) })
+        Some(Ellipsoid { placement, semi_axes: value.map(|v| (times * v.max(0.0)).sqrt()) })
     }
 
     /// The same shape, as large as it must be to hold all finite points.
@@ -172,19 +192,33 @@ mod tests {
     #[test]
     fn fits_recover_an_ellipsoid_and_bounds_hold_all() {
         let e = some([0.08, 0.14, 0.1]);
-        let sphere = pelage_geom::shapes::cube_sphere(24, 1.0).position;
+        let sphere = pelage_geom::shapes::cube_sphere(24, 1.0);
         let points: Vec<[f64; 3]> = sphere
+            .position
             .iter()
             .map(|n| e.placement.apply(Vec3::from(*n).component_mul(&Vec3::from(e.semi_axes))).into())
             .collect();
-        let fit = Ellipsoid::fit(&points).unwrap();
+        let fit = Ellipsoid::fit(&points, &sphere.triangle).unwrap();
         for p in &points {
-            assert!(fit.sample(Vec3::from(*p)).distance.abs() < 2e-3);
+            assert!(fit.sample(Vec3::from(*p)).distance.abs() < 5e-4);
         }
+        // Many small triangles around a pole do not pull it.
+        let globe = |i: i32, j: i32| {
+            let (u, v) = (std::f64::consts::PI * f64::from(i) / 12.0, std::f64::consts::TAU * f64::from(j) / 24.0);
+            [libm::sin(u) * libm::cos(v), libm::cos(u), libm::sin(u) * libm::sin(v)]
+        };
+        let vertices: Vec<[f64; 3]> = (0..=12).flat_map(|i| (0..24).map(move |j| globe(i, j))).collect();
+        let quad = |i: u32, j: u32| [24 * i + j, 24 * i + (j + 1) % 24, 24 * i + 24 + j, 24 * i + 24 + (j + 1) % 24];
+        let triangles: Vec<[u32; 3]> = (0..12)
+            .flat_map(|i| (0..24).map(move |j| quad(i, j)))
+            .flat_map(|[a, b, c, d]| [[a, b, c], [b, d, c]])
+            .collect();
+        let round = Ellipsoid::fit(&vertices, &triangles).unwrap();
+        assert!(round.semi_axes.iter().all(|a| (a - 0.99).abs() < 0.01), "{:?}", round.semi_axes);
         let all = fit.around(&points);
         assert!(points.iter().all(|p| all.sample(Vec3::from(*p)).distance < 1e-9));
-        assert!(Ellipsoid::fit(&[[f64::NAN; 3]]).is_none());
-        let flat = Ellipsoid::fit(&[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]).unwrap();
+        assert!(Ellipsoid::fit(&[[f64::NAN; 3]], &[[0; 3]]).is_none());
+        let flat = Ellipsoid::fit(&[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], &[[0, 1, 2]]).unwrap();
         let s = flat.sample(Vec3::new(0.3, 0.3, 1.0));
         assert!((s.distance - 1.0).abs() < 1e-2 && s.normal.norm() > 0.99);
         for p in [Vec3::zeros(), flat.placement.apply(Vec3::zeros()), Vec3::repeat(f64::NAN)] {
