@@ -268,16 +268,25 @@ fn deepest(shot: &ShotFolder, frame: f64, moved: f64) -> f64 {
     deepest
 }
 
-#[test]
-fn the_skin_and_other_meshes_keep_hair_out() {
-    let shot = simulated_shot(COMMAND, 4);
-    // A ball that only slides, soft hair on it.
-    let slide: String =
-        (0..=4).map(|f| format!("{},{},0,0,0,0,0,1\n", f64::from(f) / 24.0, 0.002 * f64::from(f))).collect();
-    shot.write("grooms/ball.csv", format!("time_s,tx,ty,tz,qx,qy,qz,qw\n{slide}"));
+/// Hair so soft that it comes down on the ball.
+fn soften(shot: &ShotFolder) {
     shot.edit(SHOT, "segments = 8", "segments = 8\nsag_free = false");
     shot.edit(GROOM, "name = \"over\"", "name = \"over\"\nmaterial = { young_gpa = 0.01 }");
     shot.edit(GROOM, "name = \"under\"", "name = \"under\"\nmaterial = { young_gpa = 0.01 }");
+}
+
+/// The ball only slides.
+fn slide(shot: &ShotFolder) {
+    let slide: String =
+        (0..=4).map(|f| format!("{},{},0,0,0,0,0,1\n", f64::from(f) / 24.0, 0.002 * f64::from(f))).collect();
+    shot.write("grooms/ball.csv", format!("time_s,tx,ty,tz,qx,qy,qz,qw\n{slide}"));
+}
+
+#[test]
+fn the_skin_and_other_meshes_keep_hair_out() {
+    let shot = simulated_shot(COMMAND, 4);
+    soften(&shot);
+    slide(&shot);
     shot.report(&[]);
     let with = deepest(&shot, 4.0, 0.6);
     assert!(with < 0.05, "hair is {with} cm inside");
@@ -317,9 +326,7 @@ fn the_skin_and_other_meshes_keep_hair_out() {
 #[test]
 fn threads_do_not_show_in_soft_hair_in_contact() {
     let shot = simulated_shot(COMMAND, 4);
-    shot.edit(SHOT, "segments = 8", "segments = 8\nsag_free = false");
-    shot.edit(GROOM, "name = \"over\"", "name = \"over\"\nmaterial = { young_gpa = 0.01 }");
-    shot.edit(GROOM, "name = \"under\"", "name = \"under\"\nmaterial = { young_gpa = 0.01 }");
+    soften(&shot);
     let other = shot.fresh();
     shot.report(&["--jobs", "1"]);
     other.report(&["--jobs", "2"]);
@@ -343,13 +350,9 @@ fn deforming_skins_and_gusts_give_the_same_bytes_from_any_checkpoint() {
 #[test]
 fn tables_and_ellipsoids_keep_hair_out_too() {
     let shot = simulated_shot(COMMAND, 4);
-    shot.edit(SHOT, "segments = 8", "segments = 8\nsag_free = false");
-    shot.edit(GROOM, "name = \"over\"", "name = \"over\"\nmaterial = { young_gpa = 0.01 }");
-    shot.edit(GROOM, "name = \"under\"", "name = \"under\"\nmaterial = { young_gpa = 0.01 }");
+    soften(&shot);
     shot.edit(SHOT, "[export]", "[simulate.body]\nkind = \"cylinder\"\n\n[export]");
-    let slide: String =
-        (0..=4).map(|f| format!("{},{},0,0,0,0,0,1\n", f64::from(f) / 24.0, 0.002 * f64::from(f))).collect();
-    shot.write("grooms/ball.csv", format!("time_s,tx,ty,tz,qx,qy,qz,qw\n{slide}"));
+    slide(&shot);
     for kind in ["cylinder", "sphere", "ellipsoid"] {
         if kind != "cylinder" {
             let before = if kind == "sphere" { "cylinder" } else { "sphere" };

@@ -5,6 +5,7 @@ use crate::{NONE, SurfacePoint, Topology, Vec3};
 use rayon::prelude::*;
 
 mod lids;
+mod ray;
 
 /// Triangles per leaf. With 1 the hierarchy doubles and building takes longer; from 8 up queries test more triangles
 /// than boxes they save.
@@ -175,59 +176,6 @@ impl Bvh {
             loop {
                 if depth == 0 {
                     return best.map(|(slot, hit)| self.signed(query, slot, &hit));
-                }
-                depth -= 1;
-                if stack[depth].far <= reach {
-                    node = stack[depth];
-                    break;
-                }
-            }
-        }
-    }
-
-    /// Nearest hit, from either side, of the ray `origin` + t `direction` with 0 <= t < `max_t`: t and where on the
-    /// mesh. No ray slips through an edge that two triangles share (Woop, Benthin, Wald 2013, "Watertight Ray/Triangle
-    /// Intersection"). Ties go to the lowest triangle.
-    pub fn ray(&self, origin: Vec3, direction: Vec3, max_t: f64) -> Option<(f64, SurfacePoint)> {
-        self.first_hit(origin, direction, max_t).map(|(t, slot, weight)| (t, surface_point(self.index[slot], weight)))
-    }
-
-    /// What [`Bvh::ray`] finds: t, place in the order of the leaves, weights of corners 1 and 2.
-    fn first_hit(&self, origin: Vec3, direction: Vec3, max_t: f64) -> Option<(f64, usize, [f64; 2])> {
-        let shear = Shear::new(origin, direction)?;
-        let inverse = direction.map(|d| 1.0 / d);
-        let mut best: Option<(usize, [f64; 2])> = None;
-        // Finite, so that a box that is missed (infinite) is never within reach.
-        let mut reach = max_t.min(f64::MAX);
-        let mut stack = [Waiting::default(); STACK];
-        let mut depth = 0;
-        let mut node = self.root?.waiting(|n| n.enter(&origin, &inverse));
-        if node.far > reach || origin.iter().chain(&direction).chain([&max_t]).any(|x| x.is_nan()) {
-            return None;
-        }
-        loop {
-            if node.count > 0 {
-                for slot in node.start as usize..(node.start + node.count) as usize {
-                    let Some((t, weight)) = shear.hit(corners(&self.position, self.triangle[slot])) else { continue };
-                    if t < reach || (t == reach && best.is_some_and(|(b, _)| self.index[slot] < self.index[b])) {
-                        reach = t;
-                        best = Some((slot, weight));
-                    }
-                }
-            } else {
-                let (near, next) = self.pair[node.start as usize].order(|n| n.enter(&origin, &inverse));
-                if near.far <= reach {
-                    if next.far <= reach {
-                        stack[depth] = next;
-                        depth += 1;
-                    }
-                    node = near;
-                    continue;
-                }
-            }
-            loop {
-                if depth == 0 {
-                    return best.map(|(slot, weight)| (reach, slot, weight));
                 }
                 depth -= 1;
                 if stack[depth].far <= reach {
@@ -596,43 +544,4 @@ pub(crate) fn edge_point(triangle: u32, edge: usize, t: f64) -> SurfacePoint {
     w[edge] = 1.0 - t;
     w[(edge + 1) % 3] = t;
     SurfacePoint { triangle, bary: [w[1] as f32, w[2] as f32] }
-}
-
-/// Ray in a space where it runs along one axis.
-struct Shear {
-    origin: Vec3,
-    axis: [usize; 3],
-    shear: Vec3,
-}
-
-impl Shear {
-    fn new(origin: Vec3, direction: Vec3) -> Option<Self> {
-        let z = direction.iamax();
-        if direction[z] == 0.0 {
-            return None;
-        }
-        let axis = [(z + 1) % 3, (z + 2) % 3, z];
-        let shear = Vec3::new(direction[axis[0]] / direction[z], direction[axis[1]] / direction[z], 1.0 / direction[z]);
-        Some(Shear { origin, axis, shear })
-    }
-
-    /// Parameter of the hit and weights of corners 1 and 2.
-    fn hit(&self, corner: [Vec3; 3]) -> Option<(f64, [f64; 2])> {
-        let [kx, ky, kz] = self.axis;
-        let p = corner.map(|c| {
-            let d = c - self.origin;
-            (d[kx] - self.shear.x * d[kz], d[ky] - self.shear.y * d[kz], self.shear.z * d[kz])
-        });
-        let side = |i: usize, j: usize| p[i].0 * p[j].1 - p[i].1 * p[j].0;
-        let (u, v, w) = (side(1, 2), side(2, 0), side(0, 1));
-        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
-            return None;
-        }
-        let sum = u + v + w;
-        if sum == 0.0 {
-            return None;
-        }
-        let t = (u * p[0].2 + v * p[1].2 + w * p[2].2) / sum;
-        (t >= 0.0).then_some((t, [v / sum, w / sum]))
-    }
 }

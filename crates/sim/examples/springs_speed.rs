@@ -6,10 +6,10 @@ use pelage_sim::band::{self, Column, HELD, Panel, RING, Window};
 use pelage_sim::lanes::{self, Kernel, Lanes, Pack, Width};
 use pelage_sim::springs::calibrate::{Section, calibrate};
 use pelage_sim::springs::kernel::{self, Group, NodeAltitude};
-use pelage_sim::springs::layout::{End, zigzag};
+use pelage_sim::springs::layout::zigzag;
 use pelage_sim::springs::paper::{self, Drive, Scratch, Settings};
 use pelage_sim::springs::plain::Model;
-use pelage_sim::{Material, Vec3};
+use pelage_sim::{End, Material, Vec3};
 use std::time::Instant;
 
 const STEP: f64 = 6e-4;

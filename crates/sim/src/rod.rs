@@ -223,9 +223,11 @@ impl<const D: usize, const ROWS: usize> Scratch<D, ROWS> {
 #[derive(Clone, Copy, Debug)]
 pub struct Damping(pub f64);
 
-/// Assembles and solves one iteration; the movement is left in `scratch.rhs`.
+/// Assembles and solves one iteration; the movement is left in `scratch.rhs`. `again`: with the factor of the last
+/// iteration (a chord step), a third of the work, good where little has moved since.
 ///
 /// `D` = 4 with twist, 3 without; `ROWS` = 2 D + 3.
+#[allow(clippy::too_many_arguments)]
 #[inline(always)]
 pub fn solve<L: Lanes, const D: usize, const ROWS: usize>(
     nodes: &[Node],
@@ -235,26 +237,17 @@ pub fn solve<L: Lanes, const D: usize, const ROWS: usize>(
     damping: Damping,
     stage: &mut Stage<'_>,
     scratch: &mut Scratch<D, ROWS>,
+    again: bool,
 ) {
+    if again {
+        sweep::<L, D, ROWS, false>(nodes, elastic, motion, turned, damping, stage, scratch);
+        band::solve::<L, D, ROWS>(&scratch.factor[..nodes.len()], &mut scratch.rhs);
+        return;
+    }
     sweep::<L, D, ROWS, true>(nodes, elastic, motion, turned, damping, stage, scratch);
     for j in (0..nodes.len()).rev() {
         band::substitute::<L, D, ROWS>(j, &scratch.factor[j], &mut scratch.rhs);
     }
-}
-
-/// The same with the factor of the last [`solve`] (a chord step): a third of the work, good where little has moved since.
-#[inline(always)]
-pub fn solve_again<L: Lanes, const D: usize, const ROWS: usize>(
-    nodes: &[Node],
-    elastic: &[Elastic],
-    motion: &[Motion],
-    turned: &[Pack],
-    damping: Damping,
-    stage: &mut Stage<'_>,
-    scratch: &mut Scratch<D, ROWS>,
-) {
-    sweep::<L, D, ROWS, false>(nodes, elastic, motion, turned, damping, stage, scratch);
-    band::solve::<L, D, ROWS>(&scratch.factor[..nodes.len()], &mut scratch.rhs);
 }
 
 /// Assembles node by node and eliminates behind; without a matrix, `scratch.rhs` is left with the negative gradient.
@@ -377,16 +370,10 @@ fn moved<L: Lanes>(x: L3<L>, d: L3<L>, scale: L) -> L3<L> {
 
 /// A frame's direction after its edge has moved, without a turn about it (parallel transport in time).
 #[inline(always)]
-fn carried<L: Lanes>(from: &Edge<L>, to: &Edge<L>, m: L3<L>) -> L3<L> {
+pub(crate) fn carried<L: Lanes>(from: &Edge<L>, to: &Edge<L>, m: L3<L>) -> L3<L> {
     let one = L::splat(1.0);
     let folded = one / (dot(from.t, to.t) + one).max(L::splat(FOLDED));
     transport(m, from.t, to.t, folded)
-}
-
-/// Carries a frame along with its edge.
-#[inline(always)]
-pub(crate) fn carry<L: Lanes>(from: &Edge<L>, to: &Edge<L>, m: &mut [Pack; 3]) {
-    store3(carried(from, to, load3(m)), m);
 }
 
 /// Moves the nodes and frames by the solution, no segment by more than [`LARGEST_TURN`]; returns the square of the

@@ -46,17 +46,7 @@ fn assembled(model: &(Vec<Node>, Vec<Elastic>), motion: &[Motion], tangent: bool
     }
     let turned = [Pack::default(); 3];
     let mut run = |eliminate: bool| {
-        let mut stage = Stage {
-            h: H,
-            y: &at,
-            base: &at,
-            contact: None,
-            friction: 0.0,
-            refresh: false,
-            solved: true,
-            air: None,
-            active: Pack::splat(1.0),
-        };
+        let mut stage = Stage::free(H, &at, &at);
         let damping = Damping(0.0);
         if eliminate {
             sweep::<Plain, 4, 11, true>(&model.0, &model.1, motion, &turned, damping, &mut stage, &mut scratch);

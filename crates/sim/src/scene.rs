@@ -43,12 +43,8 @@ impl Scene<'_> {
     fn placement(&self, world: &Rigid, ends: [&[Root]; 2], s: usize, fraction: f64) -> Rigid {
         let [a, b] = [&ends[0][s], &ends[1][s]];
         let f = fraction;
-        let dot: f64 = (0..4).map(|i| a.rotation[i] * b.rotation[i]).sum();
-        let sign = if dot < 0.0 { -1.0 } else { 1.0 };
-        let q: [f64; 4] = std::array::from_fn(|i| (1.0 - f) * a.rotation[i] + sign * f * b.rotation[i]);
-        let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
         let local = Rigid {
-            rotation: q.map(|x| x / norm),
+            rotation: Rigid::turn_between(a.rotation, b.rotation, f),
             translation: std::array::from_fn(|i| (1.0 - f) * a.position[i] + f * b.position[i]),
         };
         let turn = world.quaternion() * local.quaternion();

@@ -127,12 +127,7 @@ fn stiffen(group: &mut Group, width: Width, settle: impl Fn(&mut Group)) -> ([f6
 
 /// Particles of a strand of springs; `None` where a segment is far shorter than the others.
 pub fn layout(points: &[Vec3], settings: &Settings) -> Option<Layout> {
-    let end = |e: End| match e {
-        End::Free => layout::End::Free,
-        End::Pinned => layout::End::Pinned,
-        End::Clamped => layout::End::Clamped,
-    };
-    let ends = [end(settings.root), end(settings.tip)];
+    let ends = [settings.root, settings.tip];
     match settings.model {
         Model::Paper => layout::only_straight(points, ends),
         _ => layout::zigzag(points, ends, calibration(settings).height),
@@ -317,17 +312,7 @@ impl Kernel for Gradient<'_> {
     fn run<L: Lanes>(self) {
         let g = self.group;
         // A step so long that inertia vanishes.
-        let mut stage = Stage {
-            h: 1e30,
-            y: self.still,
-            base: self.still,
-            contact: None,
-            friction: 0.0,
-            refresh: false,
-            solved: false,
-            air: None,
-            active: Pack::splat(1.0),
-        };
+        let mut stage = Stage::free(1e30, self.still, self.still);
         let turned = vec![Pack::default(); g.node.len()];
         let damping = Damping(0.0);
         rod::sweep::<L, 4, 11, false>(&g.node, &g.elastic, &g.motion, &turned, damping, &mut stage, self.scratch);

@@ -99,6 +99,14 @@ pub struct Stage<'a> {
     pub active: Pack,
 }
 
+impl<'a> Stage<'a> {
+    /// A stage in which nothing acts but inertia and elasticity, on every lane.
+    pub fn free(h: f64, y: &'a [[Pack; 3]], base: &'a [[Pack; 3]]) -> Self {
+        let active = Pack::splat(1.0);
+        Stage { h, y, base, contact: None, friction: 0.0, refresh: false, solved: false, air: None, active }
+    }
+}
+
 /// Opens the panel of a node, if there is to be a matrix, and its right-hand side: inertia, contact and friction, drag.
 #[inline(always)]
 pub fn open_node<L: Lanes, const D: usize, const ROWS: usize, const MATRIX: bool>(

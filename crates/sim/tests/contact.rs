@@ -2,47 +2,9 @@
 
 mod common;
 
-use common::{GRAVITY, Shot, Vec3, turned};
-use pelage_geom::Mesh;
-use pelage_geom::{Bvh, Topology, shapes};
-use pelage_sim::{Body, Ellipsoid, End, Exact, Field, FieldSettings, Material, Part, Settings, Shape};
-
-/// A ball as a mesh with its field.
-struct Ball {
-    mesh: Mesh,
-    bvh: Bvh,
-    field: Field,
-}
-
-fn ball(radius: f64) -> Ball {
-    let mesh = shapes::cube_sphere(48, radius);
-    let topology = Topology::new(&mesh);
-    let bvh = Bvh::build(&mesh.position, &mesh.triangle, &topology);
-    let field = Field::build(&mesh.position, &mesh.triangle, &topology, &bvh, &FieldSettings::default(), None);
-    Ball { mesh, bvh, field }
-}
-
-/// Hairs that stand on the upper half of a ball and lean over.
-fn tuft(radius: f64, count: usize, length: f64, points: usize) -> Vec<Vec<[f64; 3]>> {
-    (0..count)
-        .map(|k| {
-            let around = 2.4 * k as f64;
-            let up = 0.3 + 0.65 * (k as f64 + 0.5) / count as f64;
-            let flat = (1.0f64 - up * up).sqrt();
-            let n = Vec3::new(flat * libm::cos(around), up, flat * libm::sin(around));
-            let down = (-Vec3::y() + n * n.y).normalize();
-            (0..points)
-                .map(|i| {
-                    let s = length * i as f64 / (points - 1) as f64;
-                    let a = s / radius;
-                    // Around the ball and slowly away from it.
-                    let out = n * libm::cos(a) + down * libm::sin(a);
-                    (out * (radius * (1.0 + 0.05 * s / length))).into()
-                })
-                .collect()
-        })
-        .collect()
-}
+use common::{GRAVITY, Shot, Vec3, ball, tuft, turned};
+use pelage_geom::shapes;
+use pelage_sim::{Body, Ellipsoid, End, Exact, Material, Part, Settings, Shape};
 
 #[test]
 fn hair_on_a_shaking_ball_stays_outside() {

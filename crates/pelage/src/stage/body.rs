@@ -220,10 +220,7 @@ impl Colliders {
     /// Between two such placements: the middle of what was fitted goes straight, the rotation along the shorter arc.
     pub(super) fn between(&self, [a, b]: &[Rigid; 2], f: f64) -> Rigid {
         let middle = self.anchor.as_ref().map_or(Vec3::zeros(), |a| a.middle);
-        let dot: f64 = (0..4).map(|i| a.rotation[i] * b.rotation[i]).sum();
-        let q: [f64; 4] = std::array::from_fn(|i| (1.0 - f) * a.rotation[i] + f.copysign(dot) * b.rotation[i]);
-        let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
-        let turn = Rigid { rotation: q.map(|x| x / norm), translation: [0.0; 3] };
+        let turn = Rigid { rotation: Rigid::turn_between(a.rotation, b.rotation, f), translation: [0.0; 3] };
         let at = a.apply(middle) * (1.0 - f) + b.apply(middle) * f;
         Rigid { translation: (at - turn.apply(middle)).into(), ..turn }
     }

@@ -1,42 +1,14 @@
 //! Hair on a ball: the change from a step to half of it, and how long many hairs take.
 
-use crate::common::{GRAVITY, Shot, Vec3, turned};
+use crate::common::{GRAVITY, Shot, Vec3, ball, tuft, turned};
 use crate::plot::{Plot, Series};
 use crate::{Write, on_threads};
-use pelage_geom::{Bvh, Mesh, Topology, shapes};
-use pelage_sim::{Body, Field, FieldSettings, Part, Rigid, Settings, Shape};
+use pelage_sim::{Body, Field, Part, Rigid, Settings, Shape};
 use std::f64::consts::TAU;
 use std::time::Instant;
 
 const RADIUS: f64 = 0.09;
 const FPS: f64 = 24.0;
-
-fn ball() -> Field {
-    let mesh: Mesh = shapes::cube_sphere(48, RADIUS);
-    let topology = Topology::new(&mesh);
-    let bvh = Bvh::build(&mesh.position, &mesh.triangle, &topology);
-    Field::build(&mesh.position, &mesh.triangle, &topology, &bvh, &FieldSettings::default(), None)
-}
-
-/// Hairs that stand on the upper half of the ball and lie around it, slowly away from it.
-fn tuft(count: usize, length: f64, segments: usize) -> Vec<Vec<[f64; 3]>> {
-    (0..count)
-        .map(|k| {
-            let around = 2.4 * k as f64;
-            let up = 0.3 + 0.65 * (k as f64 + 0.5) / count as f64;
-            let flat = (1.0f64 - up * up).sqrt();
-            let n = Vec3::new(flat * libm::cos(around), up, flat * libm::sin(around));
-            let down = (-Vec3::y() + n * n.y).normalize();
-            (0..=segments)
-                .map(|i| {
-                    let s = length * i as f64 / segments as f64;
-                    let out = n * libm::cos(s / RADIUS) + down * libm::sin(s / RADIUS);
-                    (out * (RADIUS * (1.0 + 0.05 * s / length))).into()
-                })
-                .collect()
-        })
-        .collect()
-}
 
 /// The ball shakes once a second by 1 rad to both sides.
 fn shake(frame: usize, f: f64) -> Rigid {
@@ -72,9 +44,9 @@ fn quantile(values: &mut [f64], q: f64) -> f64 {
 }
 
 pub fn halved(write: Write) {
-    let field = ball();
+    let field = ball(RADIUS).field;
     let (length, segments) = (0.2, 40);
-    let hairs = tuft(200, length, segments);
+    let hairs = tuft(RADIUS, 200, length, segments + 1);
     let mut series = Vec::new();
     println!(
         "body,substeps,rms_all,frame_rms_median,frame_rms_p95,hair_rms_median,hair_rms_p95,seconds,strands_halved"
@@ -139,8 +111,8 @@ fn processor() -> f64 {
 /// Seconds a frame on two threads. A third argument is the number of hairs.
 pub fn many() {
     let count = std::env::args().nth(3).and_then(|v| v.parse().ok()).unwrap_or(10_000);
-    let field = ball();
-    let hairs = tuft(count, 0.2, 50);
+    let field = ball(RADIUS).field;
+    let hairs = tuft(RADIUS, count, 0.2, 51);
     let frames = 2;
     on_threads(2, || {
         for solid in [true, false] {

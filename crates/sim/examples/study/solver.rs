@@ -2,12 +2,13 @@
 
 use crate::common::{GRAVITY, Shot};
 use crate::{cpu_seconds, on_threads};
+use pelage_sim::End;
 use pelage_sim::band::{self, Column, HELD, Panel, RING, Window};
 use pelage_sim::group::Strand;
 use pelage_sim::lanes::{self, Kernel, LANES, Lanes, Pack, Width};
 use pelage_sim::rod::{self, Damping, Scratch};
 use pelage_sim::springs::calibrate::{Section, calibrate};
-use pelage_sim::springs::layout::{End, zigzag};
+use pelage_sim::springs::layout::zigzag;
 use pelage_sim::springs::plain;
 use pelage_sim::stage::Stage;
 use pelage_sim::{Material, Settings, Vec3, settle};
@@ -319,19 +320,9 @@ impl Iteration {
 impl Iteration {
     #[inline(always)]
     fn solve<L: Lanes>(&self, scratch: &mut Scratch<4, 11>) {
-        let mut stage = Stage {
-            h: self.h,
-            y: &self.y,
-            base: &self.base,
-            contact: None,
-            friction: 0.0,
-            refresh: false,
-            solved: false,
-            air: None,
-            active: Pack::splat(1.0),
-        };
+        let mut stage = Stage::free(self.h, &self.y, &self.base);
         let g = &self.group;
-        rod::solve::<L, 4, 11>(&g.node, &g.elastic, &g.motion, &self.turned, Damping(0.0), &mut stage, scratch);
+        rod::solve::<L, 4, 11>(&g.node, &g.elastic, &g.motion, &self.turned, Damping(0.0), &mut stage, scratch, false);
     }
 }
 

@@ -47,6 +47,14 @@ impl Rigid {
         UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z))
     }
 
+    /// A fraction of the way from one rotation to another, unit quaternions, along the shorter arc; linear and normalised.
+    pub fn turn_between(a: [f64; 4], b: [f64; 4], f: f64) -> [f64; 4] {
+        let dot: f64 = (0..4).map(|i| a[i] * b[i]).sum();
+        let q: [f64; 4] = std::array::from_fn(|i| (1.0 - f) * a[i] + f.copysign(dot) * b[i]);
+        let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
+        q.map(|x| x / norm)
+    }
+
     /// Moves a local point into the world.
     pub fn apply(&self, local: Vec3) -> Vec3 {
         self.quaternion() * local + Vec3::from(self.translation)

@@ -25,11 +25,7 @@ impl<const D: usize, const ROWS: usize> Kernel for Iterate<'_, '_, D, ROWS> {
     #[inline(always)]
     fn run<L: Lanes>(self) -> Pack {
         let Iterate { g, turned, damping, mut stage, scratch, again } = self;
-        if again {
-            rod::solve_again::<L, D, ROWS>(&g.node, &g.elastic, &g.motion, turned, damping, &mut stage, scratch);
-        } else {
-            rod::solve::<L, D, ROWS>(&g.node, &g.elastic, &g.motion, turned, damping, &mut stage, scratch);
-        }
+        rod::solve::<L, D, ROWS>(&g.node, &g.elastic, &g.motion, turned, damping, &mut stage, scratch, again);
         let largest =
             rod::apply::<L, D, ROWS>(&g.node, Some(&g.elastic), &mut g.motion, turned, &stage.active, scratch);
         let mut out = Pack::default();
@@ -213,7 +209,8 @@ impl Kernel for Predict<'_> {
                 let (rest, stretch) = (L::load(&self.node[i - 1].length), L::load(&self.elastic[i - 1].stretch));
                 (stretch * (before.length - rest)).store(&mut pull[i - 1]);
                 if self.frames {
-                    rod::carry(&before, &edge(is, new), &mut self.motion[i - 1].m);
+                    let m = &mut self.motion[i - 1].m;
+                    store3(rod::carried(&before, &edge(is, new), load3(m)), m);
                 }
             }
             behind = Some((old, new));

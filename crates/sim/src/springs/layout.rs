@@ -1,19 +1,8 @@
 //! Where a strand's particles are: the hair's points, and extra particles off its axis (section 3.2).
 
 use crate::Vec3;
+use crate::settings::End;
 use pelage_geom::NONE;
-
-/// What holds an end of a hair.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum End {
-    /// Nothing.
-    #[default]
-    Free,
-    /// The point is held, its segment turns freely.
-    Pinned,
-    /// The point and the direction of its segment are held, by a held ghost segment that continues the hair.
-    Clamped,
-}
 
 /// Particles of a strand in the order of its matrix.
 #[derive(Clone, Debug, Default, PartialEq)]

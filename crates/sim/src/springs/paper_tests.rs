@@ -2,10 +2,11 @@
 
 use super::calibrate::{Section, calibrate};
 use super::kernel::{self, Group};
-use super::layout::{End, only_straight};
+use super::layout::only_straight;
 use super::paper::{Drive, Scratch, Settings, State, limit_strain, step};
 use super::plain::Model;
 use crate::lanes::{self, Kernel, Lanes, Pack, Width};
+use crate::settings::End;
 use crate::{Material, Vec3};
 use pelage_geom::rng;
 

@@ -2,12 +2,13 @@
 
 use super::calibrate::{Section, calibrate};
 use super::kernel;
-use super::layout::{End, only_straight, zigzag};
+use super::layout::{only_straight, zigzag};
 use super::plain::{Choice, Model, choose, energy, gradient, tangent};
 use super::sag::{LIMIT, without_sag};
 use super::tetrahedron::volume;
 use crate::band::{self, Column, HELD, Panel, RING, Window};
 use crate::lanes::{self, Kernel, LANES, Lanes, Pack, Width};
+use crate::settings::End;
 use crate::{Material, Vec3};
 use pelage_geom::rng;
 

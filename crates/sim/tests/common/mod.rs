@@ -2,9 +2,10 @@
 #![allow(dead_code)]
 
 use nalgebra::{UnitQuaternion, Vector3};
-use pelage_geom::Offsets;
+use pelage_geom::{Bvh, Mesh, Offsets, Topology, shapes};
 use pelage_sim::{
-    Body, End, Hairs, Material, Model, Rigid, Root, Settings, Simulation, Span, SpanReport, Started, Wind,
+    Body, End, Field, FieldSettings, Hairs, Material, Model, Rigid, Root, Settings, Simulation, Span, SpanReport,
+    Started, Wind,
 };
 
 pub type Vec3 = Vector3<f64>;
@@ -86,6 +87,43 @@ pub fn placed(p: [f64; 3]) -> Root {
 /// A placement there, turned about an axis.
 pub fn placed_turned(p: [f64; 3], axis: Vec3, angle: f64) -> Root {
     Root { position: p, rotation: turned(axis, angle).rotation }
+}
+
+/// A ball as a mesh with its field.
+pub struct Ball {
+    pub mesh: Mesh,
+    pub bvh: Bvh,
+    pub field: Field,
+}
+
+pub fn ball(radius: f64) -> Ball {
+    let mesh = shapes::cube_sphere(48, radius);
+    let topology = Topology::new(&mesh);
+    let bvh = Bvh::build(&mesh.position, &mesh.triangle, &topology);
+    let field = Field::build(&mesh.position, &mesh.triangle, &topology, &bvh, &FieldSettings::default(), None);
+    Ball { mesh, bvh, field }
+}
+
+/// Hairs that stand on the upper half of a ball and lie around it, slowly away from it.
+pub fn tuft(radius: f64, count: usize, length: f64, points: usize) -> Vec<Vec<[f64; 3]>> {
+    (0..count)
+        .map(|k| {
+            let around = 2.4 * k as f64;
+            let up = 0.3 + 0.65 * (k as f64 + 0.5) / count as f64;
+            let flat = (1.0f64 - up * up).sqrt();
+            let n = Vec3::new(flat * libm::cos(around), up, flat * libm::sin(around));
+            let down = (-Vec3::y() + n * n.y).normalize();
+            (0..points)
+                .map(|i| {
+                    let s = length * i as f64 / (points - 1) as f64;
+                    let a = s / radius;
+                    // Around the ball and slowly away from it.
+                    let out = n * libm::cos(a) + down * libm::sin(a);
+                    (out * (radius * (1.0 + 0.05 * s / length))).into()
+                })
+                .collect()
+        })
+        .collect()
 }
 
 /// Hairs in a simulation, with the roots where they were groomed.
