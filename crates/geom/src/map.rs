@@ -78,6 +78,24 @@ fn texels(x: f32, size: usize, wrap: Wrap) -> ([usize; 2], f32) {
 }
 
 impl TiledMap {
+    /// First channel of the texel that a point lies in; 0 where no tile covers it.
+    pub fn nearest(&self, uv: [f32; 2]) -> f32 {
+        let texel = |map: &Map, uv: [f32; 2], wrap| {
+            let side = |x: f32, size: usize| {
+                let (near, weight) = texels(x, size, wrap);
+                near[usize::from(weight >= 0.5)]
+            };
+            map.data[(side(uv[1], map.height) * map.width + side(uv[0], map.width)) * map.channels]
+        };
+        match self.tiles.as_slice() {
+            [(0, map)] => texel(map, uv, self.wrap),
+            tiles => {
+                let found = udim(uv).and_then(|n| tiles.binary_search_by_key(&n, |t| t.0).ok());
+                found.map_or(0.0, |k| texel(&tiles[k].1, uv.map(|x| x - x.floor()), Wrap::Clamp))
+            }
+        }
+    }
+
     /// Bilinear sample; 0 where no tile covers the point.
     pub fn sample(&self, uv: [f32; 2]) -> [f32; 3] {
         match self.tiles.as_slice() {

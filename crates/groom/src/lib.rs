@@ -8,6 +8,7 @@ pub mod comb;
 pub mod control;
 pub mod instance;
 pub mod interpolate;
+pub mod look;
 pub mod parting;
 pub mod place;
 mod point_grid;

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::cache::FileHashes;
-use crate::config::{BodyKind, BodyMesh, Document, Feature, GroomFile, Material, SEGMENTS, ShotFile, Target};
+use crate::config::{BodyKind, BodyMesh, Document, Emitter, Feature, GroomFile, Material, SEGMENTS, ShotFile, Target};
 use crate::format::csv;
 use pelage_geom::RigidMotion;
 use pelage_geom::motion::RigidTransform;
@@ -111,6 +111,8 @@ pub struct Project {
     pub bodies: Vec<BodyFile>,
     /// The motion of a skin that moves as a whole.
     pub motion: Option<SkinMotion>,
+    /// Files of particles, one entry an emitter.
+    pub particles: Vec<Option<InputFile>>,
     /// Every map, by the path written in the groom file: UDIM number (0 without tiles) and file.
     pub maps: BTreeMap<PathBuf, Vec<(u32, InputFile)>>,
 }
@@ -153,6 +155,12 @@ impl Project {
         let bodies = if simulated { find.bodies(&shot)? } else { Vec::new() };
         let drawn = groom.value.control.placement.curves.as_ref();
         let drawn = drawn.map(|p| find.file(&groom, "control.placement.curves", p)).transpose()?;
+        let emitters = groom.value.emitter.iter().enumerate();
+        let file = |(k, e): (usize, &Emitter)| {
+            e.file.as_ref().map(|f| find.file(&groom, &format!("emitter[{k}].file"), f)).transpose()
+        };
+        let particles = emitters.map(file).collect::<Result<_, _>>()?;
+        check_overrides(&shot, &groom)?;
         let mut maps = BTreeMap::new();
         for (key, path) in named_maps(&groom.value) {
             if let std::collections::btree_map::Entry::Vacant(place) = maps.entry(path) {
@@ -161,7 +169,7 @@ impl Project {
             }
         }
         hashes.save();
-        Ok(Project { shot, groom, rest, curves, bodies, drawn, frames, before, motion, maps })
+        Ok(Project { shot, groom, rest, curves, bodies, drawn, frames, before, motion, particles, maps })
     }
 
     /// Folder of the shot's outputs.
@@ -212,13 +220,36 @@ impl Project {
         self.groom.value.layer[i].simulate.unwrap_or(self.shot.value.simulate.target)
     }
 
+    /// Points of a hair of a layer as it is simulated or interpolated.
+    pub fn base_points(&self, i: usize) -> usize {
+        match self.target(i) {
+            Target::EveryHair => self.segments() + 1,
+            _ => self.points(i),
+        }
+    }
+
     /// Points of a hair of a layer in the finished frames.
     pub fn points(&self, i: usize) -> usize {
         let groom = &self.groom.value;
-        match self.target(i) {
-            Target::EveryHair => self.segments() + 1,
-            _ => groom.layer[i].points.unwrap_or(groom.control.points),
-        }
+        let simulated = self.target(i) == Target::EveryHair;
+        let default = if simulated { self.segments() + 1 } else { groom.control.points };
+        groom.layer[i].points.unwrap_or(default)
+    }
+
+    /// True if hair is clumped where particles hit the skin.
+    pub fn has_areas(&self) -> bool {
+        let clumps = self.groom.value.layer.iter().flat_map(|l| &l.clump);
+        self.shot.value.look.clump && clumps.into_iter().any(|c| !c.areas.is_empty())
+    }
+
+    /// Number of the frame whose keys hold: at rest, the shot's first.
+    pub fn moment(&self, frame: Option<i32>) -> f64 {
+        f64::from(frame.unwrap_or(self.shot.value.shot.frames[0]))
+    }
+
+    /// Seconds from the shot's first frame.
+    pub fn seconds(&self, frame: Option<i32>) -> f64 {
+        (self.moment(frame) - self.moment(None)) / self.shot.value.shot.fps
     }
 
     /// Segments of a simulated hair of a groom.
@@ -258,6 +289,22 @@ fn missing<T>(doc: &Document<T>, key: &str, path: &Path) -> crate::config::Confi
     doc.error(key, format!("there is no file {}", path.display()), "paths are relative to the file that names them")
 }
 
+/// Levels of clumps that a shot changes must be in its groom.
+fn check_overrides(shot: &Document<ShotFile>, groom: &Document<GroomFile>) -> Result<(), Error> {
+    for (j, o) in shot.value.look.overrides.iter().enumerate() {
+        let at = format!("look.override[{j}]");
+        let Some(layer) = groom.value.layer.iter().find(|l| l.name == o.layer) else {
+            let what = format!("the groom has no layer `{}`", o.layer);
+            return Err(shot.error(&format!("{at}.layer"), what, "name a [[layer]] of the groom file").into());
+        };
+        if o.clump >= layer.clump.len() {
+            let what = format!("layer {} has {} levels of clumps", o.layer, layer.clump.len());
+            return Err(shot.error(&format!("{at}.clump"), what, "they are numbered from 0").into());
+        }
+    }
+    Ok(())
+}
+
 /// Every map that a groom names, with the key that names it.
 fn named_maps(groom: &GroomFile) -> Vec<(String, PathBuf)> {
     let mut out = Vec::new();
@@ -274,6 +321,12 @@ fn named_maps(groom: &GroomFile) -> Vec<(String, PathBuf)> {
         add(format!("layer[{i}].width.map"), l.width.map.as_ref());
         add(format!("layer[{i}].opacity.map"), l.opacity.map.as_ref());
         add(format!("layer[{i}].color.map"), l.color.map.as_ref());
+        for (key, v) in l.varied() {
+            add(format!("layer[{i}].{key}.{}.map", v.name), v.value.0.map.as_ref());
+        }
+        for (key, m) in l.look_maps() {
+            add(format!("layer[{i}].{key}.map"), Some(&m.map));
+        }
     }
     out
 }

@@ -1,6 +1,7 @@
 //! The groom file: control hairs, how they are combed, and the layers of hair grown from maps.
 
 use super::document::{ConfigError, Document, Fixed, exactly};
+use super::look::{Clump, Collision, Curl, Emitter, Noise, Operator, Wave, WindLook};
 use super::simulate::{Material, Target, check_material};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer};
@@ -18,6 +19,9 @@ pub struct GroomFile {
     /// Combing, in this order.
     #[serde(default)]
     pub comb: Vec<Comb>,
+    /// Particles that open areas of clumped hair.
+    #[serde(default)]
+    pub emitter: Vec<Emitter>,
     /// Layers of hair: undercoat, overcoat, any number.
     pub layer: Vec<Layer>,
 }
@@ -302,14 +306,32 @@ pub struct Layer {
     /// Colour. Default: brown.
     #[serde(default = "default_color")]
     pub color: ColorFeature,
-    /// Points of a hair, the root included; hairs simulated one by one have `simulate.segments` + 1 instead. Default: as
-    /// many as the control hairs have.
+    /// Points of a finished hair, the root included. Default: as many as the control hairs have; for hairs simulated one by
+    /// one, `simulate.segments` + 1. More of them are laid on a smooth curve.
     pub points: Option<usize>,
     /// What the hair is made of when it is simulated.
     #[serde(default)]
     pub material: Material,
     /// What is simulated of this layer. Default: what the shot says.
     pub simulate: Option<Target>,
+    /// Levels of clumps, the finest first.
+    #[serde(default)]
+    pub clump: Vec<Clump>,
+    /// Curls.
+    pub curl: Option<Curl>,
+    /// Waves and noise along four stations of the hair.
+    #[serde(default)]
+    pub wave: Vec<Wave>,
+    /// Noise and frizz.
+    #[serde(default)]
+    pub noise: Vec<Noise>,
+    /// Wind for hair that is not simulated.
+    pub wind: Option<WindLook>,
+    /// Keeping finished hairs out of the skin.
+    #[serde(default)]
+    pub collision: Collision,
+    /// Order in which the operators act. Default: clump, curl, wave, noise, wind. Collision comes last.
+    pub order: Option<Vec<Operator>>,
 }
 
 fn default_width() -> WidthFeature {
@@ -345,6 +367,7 @@ impl Document<GroomFile> {
         for (i, c) in self.value.comb.iter().enumerate() {
             self.check_comb(&format!("comb[{i}]"), c)?;
         }
+        self.check_emitters()?;
         if self.value.layer.is_empty() {
             return Err(self.error("layer", "the groom has no layer", "add a [[layer]]"));
         }
@@ -398,6 +421,7 @@ impl Document<GroomFile> {
         }
         self.within(&format!("{key}.color.noise"), l.color.noise, 0.0, 1.0)?;
         check_material(self, &format!("{key}.material"), &l.material)?;
+        self.check_look(key, l)?;
         self.points(&format!("{key}.points"), l.points)
     }
 
@@ -469,7 +493,7 @@ impl Document<GroomFile> {
         }
     }
 
-    fn within(&self, key: &str, x: f64, low: f64, high: f64) -> Result<(), ConfigError> {
+    pub(super) fn within(&self, key: &str, x: f64, low: f64, high: f64) -> Result<(), ConfigError> {
         if (low..=high).contains(&x) {
             return Ok(());
         }

@@ -2,6 +2,7 @@
 
 mod document;
 mod groom;
+mod look;
 mod shot;
 mod simulate;
 
@@ -10,6 +11,10 @@ pub use groom::{
     Channel, ColorFeature, Comb, CombKind, Control, Feature, GroomFile, Layer, MapRef, Parting, Placement,
 };
 pub use groom::{Side, Space, WidthFeature, WrapMode};
+pub use look::{
+    Clump, ClumpOf, Collision, Curl, CurlKind, CurlWave, Dilation, Emitter, Look, LookOverride, LookValue, Noise, Operator, VaryScale,
+    Varied, VariedValue, Wave, WaveAxis, WaveShape, WindLook,
+};
 pub use shot::{CacheSettings, Export, ExportFormat, GroomRef, Preview, Shot, ShotFile, Skin, UpAxis};
 pub use simulate::{
     Amount, Key, Keyed, Material, SEGMENTS, Simulate, StrandModel, Target, Vector, WindSettings, check_material,

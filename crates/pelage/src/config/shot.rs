@@ -1,6 +1,7 @@
 //! The shot file, `pipeline.toml`.
 
 use super::document::{ConfigError, Document, exactly};
+use super::look::Look;
 use super::simulate::{Simulate, Target};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -19,6 +20,9 @@ pub struct ShotFile {
     /// How hair is simulated.
     #[serde(default)]
     pub simulate: Simulate,
+    /// What this shot changes of the groom's look.
+    #[serde(default)]
+    pub look: Look,
     /// Files to write.
     #[serde(default)]
     pub export: Export,

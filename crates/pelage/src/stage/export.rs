@@ -2,6 +2,7 @@
 //! then renamed.
 
 use super::run::{Counts, Runner};
+use super::plan_look::finished_rest;
 use super::{Step, What, curves, groom, instance, interpolate};
 use crate::Error;
 use crate::config::{ExportFormat, UpAxis};
@@ -88,7 +89,8 @@ pub fn facts(run: &mut Runner<'_>) -> Result<ShotFacts, Error> {
 
 /// The parts of a layer that do not change over the shot.
 fn hair_layer(run: &mut Runner<'_>, i: usize) -> Result<HairLayer, Error> {
-    Ok(HairLayer { rest: interpolate::positions(run, What::Rest(i))?, ..look(run, i)? })
+    let rest = finished_rest(run.project, i);
+    Ok(HairLayer { rest: interpolate::positions(run, rest)?, ..look(run, i)? })
 }
 
 /// A layer's hairs without any positions.

@@ -169,11 +169,11 @@ fn place_hairs(run: &mut Runner<'_>) -> Result<(ControlHairs, Sites, Counts), Er
     Ok((hairs, sites, counts))
 }
 
-fn view(skin: &Skin) -> control::Skin<'_> {
+pub(super) fn view(skin: &Skin) -> control::Skin<'_> {
     control::Skin { mesh: &skin.mesh, topology: &skin.topology, rest: &skin.rest }
 }
 
-fn partings(run: &Runner<'_>) -> Vec<Vec<Vec3>> {
+pub(super) fn partings(run: &Runner<'_>) -> Vec<Vec<Vec3>> {
     let groom = &run.project.groom.value;
     groom.parting.iter().map(|p| p.points.iter().map(|q| Vec3::from(*q)).collect()).collect()
 }

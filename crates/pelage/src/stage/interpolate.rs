@@ -1,6 +1,7 @@
 //! Interpolate: every hair at every frame, from control hairs on the skin of that frame.
 
 use super::run::{Counts, Runner};
+use super::look::{self, Displaced};
 use super::{What, curves, groom, instance, simulate};
 use crate::Error;
 use crate::config::Target;
@@ -34,9 +35,10 @@ fn layer(run: &mut Runner<'_>, i: usize) -> Result<Rc<LayerHairs>, Error> {
     let roots = instance::roots(run, i)?;
     let (hair, weight) = instance::weights(run, i)?;
     let length = instance::column(run, What::Length(i), i)?;
-    let points = run.project.points(i);
-    if u32::try_from(roots.id.len() * points).is_err() {
-        let what = format!("{} hairs of {points} points are more than 2^32 points", roots.id.len());
+    let points = run.project.base_points(i);
+    let most = points.max(run.project.points(i));
+    if u32::try_from(roots.id.len() * most).is_err() {
+        let what = format!("{} hairs of {most} points are more than 2^32 points", roots.id.len());
         let help = "lower the density or the points, or make two layers of it";
         return Err(run.project.groom.error(&format!("layer[{i}].points"), what, help).into());
     }
@@ -47,38 +49,67 @@ fn layer(run: &mut Runner<'_>, i: usize) -> Result<Rc<LayerHairs>, Error> {
 
 /// Positions of a layer's hairs at rest or at a frame, scene units relative to the skin's origin, hair after hair.
 pub fn positions(run: &mut Runner<'_>, what: What) -> Result<Vec<[f32; 3]>, Error> {
-    let (i, at) = match what {
-        What::Rest(i) => (i, SkinAt::Rest),
-        What::Frame(i, f) => (i, run.project.frames[&f].clone()),
+    Ok(hairs(run, what)?.position)
+}
+
+/// A layer's hairs at rest or at a frame.
+pub fn hairs(run: &mut Runner<'_>, what: What) -> Result<Displaced, Error> {
+    let (i, frame, at) = match what {
+        What::Rest(i) | What::Finished(i) => (i, None, SkinAt::Rest),
+        What::Frame(i, f) => (i, Some(f), run.project.frames[&f].clone()),
         other => unreachable!("{other:?} has no positions"),
     };
     if let Some(entry) = run.fetch(what)
         && let Some(found) = entry.payload.into_iter().next().and_then(|b| mcap::read_frame_payload(&b).ok())
-        && let Some(first) = found.into_iter().next()
+        && let Some(found) = unpacked(found)
     {
-        return Ok(first);
+        return Ok(found);
     }
-    let (out, cancelled) = match (what, run.project.target(i)) {
+    let (base, cancelled) = match (what, run.project.target(i)) {
+        (What::Finished(i), _) => (positions(run, What::Rest(i))?, 0),
         (What::Frame(_, f), Target::EveryHair) => (simulate::positions(run, i, f)?, 0),
         (What::Frame(_, f), _) if run.project.curves.is_some() => (curves::ridden(run, f)?, 0),
         _ if run.project.curves.is_some() => (curves::rest(run)?, 0),
         _ => blended(run, what, i, &at)?,
     };
-    let hairs = match &run.project.curves {
+    let count = match &run.project.curves {
         Some(_) => curves::hair(run)?.offsets.len(),
         None => instance::roots(run, i)?.id.len(),
     };
-    let counts = Counts::from([
-        ("hairs".to_owned(), hairs as u64),
-        ("points".to_owned(), out.len() as u64),
+    let mut counts = Counts::from([
+        ("hairs".to_owned(), count as u64),
         ("hairs with cancelled directions".to_owned(), cancelled as u64),
     ]);
+    let out = if look::acts(run, what) {
+        look::finish(run, what, frame, &at, base, &mut counts)?
+    } else {
+        Displaced { position: base, wet: Vec::new() }
+    };
+    counts.insert("points".to_owned(), out.position.len() as u64);
     let name = run.plan.step(what).name.clone();
-    let frame = if let What::Frame(_, f) = what { f } else { 0 };
-    let mut file = std::io::Cursor::new(Vec::with_capacity(out.len() * 12 + 4096));
-    mcap::write_frame_payload(&mut file, &name, frame, &[&out]).expect("writing to memory does not fail");
+    let mut file = std::io::Cursor::new(Vec::with_capacity(out.position.len() * 12 + 4096));
+    let wet: Vec<[f32; 3]> = out.wet.iter().map(|w| [w[0], w[1], 0.0]).collect();
+    let both: [&[[f32; 3]]; 2] = [&out.position, &wet];
+    let arrays = if wet.is_empty() { &both[..1] } else { &both[..] };
+    mcap::write_frame_payload(&mut file, &name, frame.unwrap_or(0), arrays).expect("writing to memory does not fail");
     run.keep(what, counts, &[("frame.mcap", file.get_ref())])?;
     Ok(out)
+}
+
+/// Hairs as they lie in the cache: positions, and factors on width and opacity if they are wet.
+fn unpacked(arrays: Vec<Vec<[f32; 3]>>) -> Option<Displaced> {
+    let mut arrays = arrays.into_iter();
+    let position = arrays.next()?;
+    let wet = arrays.next().unwrap_or_default().into_iter().map(|w| [w[0], w[1]]).collect();
+    Some(Displaced { position, wet })
+}
+
+/// Hairs of a layer at rest before anything displaces them.
+pub fn undisplaced(run: &mut Runner<'_>, i: usize) -> Result<Vec<[f32; 3]>, Error> {
+    match run.project.target(i) {
+        Target::EveryHair => positions(run, What::Rest(i)),
+        _ => Ok(blended(run, What::Rest(i), i, &SkinAt::Rest)?.0),
+    }
 }
 
 /// Hairs blended from control hairs, and how many had directions that cancelled.

@@ -1,8 +1,12 @@
 //! The stages of a shot. `plan` says what each step reads; a stage file runs its steps: read, call one pure function,
 //! write.
 
+mod areas;
 mod body;
+mod clumps;
+mod look;
 mod plan;
+mod plan_look;
 mod plan_simulate;
 mod run;
 mod skin;

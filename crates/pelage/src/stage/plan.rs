@@ -1,6 +1,7 @@
 //! Every step of a shot with its recipe: what each step reads, and nothing else, enters its key.
 
 use super::Stage;
+use super::plan_look::{Hairs, effects, finished_rest};
 use crate::cache::{Field, Recipe};
 use crate::config::{Comb, ExportFormat, Feature, MapRef, Parting, Target};
 use crate::project::{Project, SkinAt, frame_list};
@@ -30,8 +31,14 @@ pub enum What {
     Opacity(usize),
     /// Colours.
     Color(usize),
-    /// A layer's hairs at the rest pose.
+    /// The clumps of a layer's level.
+    Clump(usize, u32),
+    /// A layer's hairs at the rest pose, as they are simulated; finished if nothing is simulated of it.
     Rest(usize),
+    /// A simulated layer's finished hairs at the rest pose.
+    Finished(usize),
+    /// Where particles have hit the skin up to the end of a frame.
+    Hits(i32),
     /// What is simulated of a layer over a stretch of frames between checkpoints.
     Simulate(usize, u32),
     /// A layer's hairs at a frame.
@@ -78,6 +85,10 @@ pub(super) mod version {
     pub const COLUMN: u32 = 1;
     pub const SIMULATE: u32 = 4;
     pub const INTERPOLATE: u32 = 1;
+    pub const CLUMP: u32 = 1;
+    pub const LOOK: u32 = 1;
+    pub const COLLISION: u32 = 1;
+    pub const AREAS: u32 = 1;
     pub const EXPORT: u32 = 1;
     pub const PREVIEW: u32 = 2;
 }
@@ -114,24 +125,20 @@ impl Plan {
                 plan.add_stretch(&r, &timeline, i, k);
             }
         }
+        for i in (0..project.groom.value.layer.len()).filter(|i| finished_rest(project, *i) == What::Finished(*i)) {
+            plan.add_finished(&r, i);
+        }
+        plan.add_hits(&r);
         for (frame, at) in &project.frames {
-            for (i, layer) in project.groom.value.layer.iter().enumerate() {
-                let simulated = What::Simulate(i, timeline.stretch_of(*frame));
-                let reads: &[What] = match project.target(i) {
-                    Target::Off if project.curves.is_some() => &[What::Curves, What::Rest(0)],
-                    Target::EveryHair => &[simulated],
-                    Target::ControlHairs => &[simulated, What::Roots(i), What::Weights(i), What::Length(i)],
-                    Target::Off => &[What::Comb, What::Roots(i), What::Weights(i), What::Length(i)],
-                };
-                let name = format!("interpolate/{}/{frame}", layer.name);
-                plan.add(What::Frame(i, *frame), name, Stage::Interpolate, r.frame(i, at, *frame), reads);
+            for i in 0..project.groom.value.layer.len() {
+                plan.add_frame(&r, i, *frame, at, What::Simulate(i, timeline.stretch_of(*frame)));
             }
         }
         let layers = 0..project.groom.value.layer.len();
         let columns = layers.clone().flat_map(|i| [What::Width(i), What::Opacity(i), What::Color(i)]);
         let look: Vec<What> = if project.curves.is_some() { vec![What::Curves] } else { columns.collect() };
         let mut all = look.clone();
-        all.extend(layers.clone().map(What::Rest));
+        all.extend(layers.clone().map(|i| finished_rest(project, i)));
         all.extend(project.frames.keys().flat_map(|f| layers.clone().map(|i| What::Frame(i, *f))));
         for format in &project.shot.value.export.formats {
             let name = format!("export/{}", format.name());
@@ -158,7 +165,42 @@ impl Plan {
             r.unit(Recipe::new("instance/curves", version::CURVES)).file("curves", &file.hash, file.label.clone());
         self.add(What::Curves, "instance/curves".into(), Stage::Instance, r.rest(recipe), &[]);
         let recipe = r.points(0, Recipe::new("interpolate", version::INTERPOLATE));
-        self.add(What::Rest(0), "interpolate/hair/rest".into(), Stage::Interpolate, recipe, &[What::Curves]);
+        self.add_rest(r, 0, "interpolate/hair/rest".into(), recipe, vec![What::Curves]);
+    }
+
+    /// A layer's hairs at the rest pose.
+    fn add_rest(&mut self, r: &Reader<'_>, i: usize, name: String, recipe: Recipe, reads: Vec<What>) {
+        let (what, skin) = (What::Rest(i), &SkinAt::Rest);
+        let [simulated, after] = effects(r.project, i);
+        let every = r.project.target(i) == Target::EveryHair;
+        let effects = if every { &simulated } else { &after };
+        let last = finished_rest(r.project, i) == what;
+        self.add_hairs(r, Hairs { what, name, recipe, effects, last, frame: None, skin }, reads);
+    }
+
+    /// A simulated layer's finished hairs at the rest pose.
+    fn add_finished(&mut self, r: &Reader<'_>, i: usize) {
+        let name = format!("interpolate/{}/finished", r.project.groom.value.layer[i].name);
+        let recipe = Recipe::new("interpolate", version::INTERPOLATE);
+        let [_, after] = effects(r.project, i);
+        let (what, skin) = (What::Finished(i), &SkinAt::Rest);
+        let step = Hairs { what, name, recipe, effects: &after, last: true, frame: None, skin };
+        self.add_hairs(r, step, vec![What::Rest(i)]);
+    }
+
+    /// A layer's finished hairs at a frame.
+    fn add_frame(&mut self, r: &Reader<'_>, i: usize, frame: i32, at: &SkinAt, simulated: What) {
+        let reads: &[What] = match r.project.target(i) {
+            Target::Off if r.project.curves.is_some() => &[What::Curves, What::Rest(0)],
+            Target::EveryHair => &[simulated],
+            Target::ControlHairs => &[simulated, What::Roots(i), What::Weights(i), What::Length(i)],
+            Target::Off => &[What::Comb, What::Roots(i), What::Weights(i), What::Length(i)],
+        };
+        let name = format!("interpolate/{}/{frame}", r.project.groom.value.layer[i].name);
+        let [_, after] = effects(r.project, i);
+        let (what, recipe) = (What::Frame(i, frame), r.frame(i, at, frame));
+        let step = Hairs { what, name, recipe, effects: &after, last: true, frame: Some(frame), skin: at };
+        self.add_hairs(r, step, reads.to_vec());
     }
 
     /// Steps of a groom up to the hairs' rest pose.
@@ -196,11 +238,12 @@ impl Plan {
             let name = format!("interpolate/{}/rest", layer.name);
             let rest = Recipe::new("interpolate", version::INTERPOLATE);
             let rest = r.skin(r.points(i, rest), &SkinAt::Rest, 0);
-            plan.add(What::Rest(i), name, Stage::Interpolate, rest, &reads);
+            plan.add_clumps(r, i);
+            plan.add_rest(r, i, name, rest, reads.to_vec());
         }
     }
 
-    fn add(&mut self, what: What, name: String, stage: Stage, mut recipe: Recipe, reads: &[What]) {
+    pub(super) fn add(&mut self, what: What, name: String, stage: Stage, mut recipe: Recipe, reads: &[What]) {
         for input in reads {
             let step = self.step(*input);
             recipe = recipe.step(&step.name.clone(), &step.recipe.key());
@@ -254,10 +297,11 @@ impl What {
     /// The layer that it belongs to, if it belongs to one.
     pub fn layer(self) -> Option<usize> {
         match self {
-            What::Candidates(i) | What::Roots(i) | What::Weights(i) | What::Rest(i) => Some(i),
-            What::Simulate(i, _) | What::Frame(i, _) => Some(i),
+            What::Candidates(i) | What::Roots(i) | What::Weights(i) | What::Rest(i) | What::Finished(i) => Some(i),
+            What::Simulate(i, _) | What::Frame(i, _) | What::Clump(i, _) => Some(i),
             What::Length(i) | What::Width(i) | What::Opacity(i) | What::Color(i) => Some(i),
-            What::Curves | What::Place | What::Comb | What::Export(_) | What::Still | What::Sheet => None,
+            What::Curves | What::Place | What::Comb | What::Hits(_) => None,
+            What::Export(_) | What::Still | What::Sheet => None,
         }
     }
 }
@@ -307,11 +351,16 @@ impl<'a> Reader<'a> {
     }
 
     fn map(&self, name: &str, m: &MapRef) -> Vec<Field> {
+        self.map_at(name, name, m)
+    }
+
+    /// Fields of a map; `name` is what it is to the step, `key` where the groom file has it.
+    pub(super) fn map_at(&self, name: &str, key: &str, m: &MapRef) -> Vec<Field> {
         let mut recipe = Recipe::new("", 0);
         for (tile, file) in &self.project.maps[&m.map] {
             recipe = recipe.file(&format!("{name}.map.{tile}"), &file.hash, file.label.clone());
         }
-        let key = self.in_groom(name);
+        let key = self.in_groom(key);
         let recipe = recipe.param(&format!("{name}.channel"), format!("{:?}", m.channel), format!("{key}.channel"));
         recipe.param(&format!("{name}.wrap"), format!("{:?}", m.wrap), format!("{key}.wrap")).fields
     }
@@ -429,7 +478,7 @@ impl<'a> Reader<'a> {
             Target::EveryHair => self.in_shot("simulate.segments (points)"),
             _ => self.in_groom(&format!("layer[{i}].points")),
         };
-        r.param("points", self.project.points(i), label)
+        r.param("points", self.project.base_points(i), label)
     }
 
     fn frame(&self, i: usize, at: &SkinAt, frame: i32) -> Recipe {
@@ -449,7 +498,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn skin(&self, r: Recipe, at: &SkinAt, frame: i32) -> Recipe {
+    pub(super) fn skin(&self, r: Recipe, at: &SkinAt, frame: i32) -> Recipe {
         match at {
             SkinAt::Rest => r.param("skin", "rest", "the skin's rest pose"),
             SkinAt::Rigid(t) => {

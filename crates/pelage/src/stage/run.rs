@@ -59,6 +59,9 @@ pub struct Runner<'a> {
     pub(super) skin: Option<Rc<skin::Skin>>,
     pub(super) roots: BTreeMap<usize, Rc<pelage_groom::instance::Roots>>,
     pub(super) layers: BTreeMap<usize, Rc<super::interpolate::LayerHairs>>,
+    pub(super) sites: BTreeMap<usize, Rc<super::clumps::RestSites>>,
+    pub(super) members: BTreeMap<(usize, usize), Rc<pelage_groom::look::member::Members>>,
+    pub(super) looks: BTreeMap<(usize, bool), Rc<super::look::LayerLook>>,
     pub(super) placed: Option<pelage_groom::control::ControlHairs>,
     pub(super) control: Option<Rc<pelage_groom::control::ControlHairs>>,
     pub(super) curves: Option<Rc<super::curves::CurveHair>>,
@@ -95,6 +98,9 @@ impl<'a> Runner<'a> {
             skin: None,
             roots: BTreeMap::new(),
             layers: BTreeMap::new(),
+            sites: BTreeMap::new(),
+            members: BTreeMap::new(),
+            looks: BTreeMap::new(),
             placed: None,
             control: None,
             curves: None,
@@ -191,6 +197,7 @@ impl<'a> Runner<'a> {
     fn selected(&self, stage: Stage) -> Vec<Step> {
         let wanted = |s: &&Step| match s.what {
             What::Frame(_, f) => self.options.frames.as_ref().is_none_or(|o| o.contains(&f)),
+            What::Hits(f) => self.options.frames.as_ref().is_none_or(|o| o.last().is_some_and(|last| f <= *last)),
             What::Simulate(_, k) => {
                 let last = self.options.frames.as_ref().map(|o| o.last().copied().unwrap_or(i32::MIN));
                 last.is_none_or(|f| *Timeline::new(self.project).stretch(k).start() <= i64::from(f))
@@ -397,7 +404,7 @@ impl<'a> Runner<'a> {
     }
 
     fn make(&mut self, what: What) -> Result<(), Error> {
-        use super::{curves, export, groom, instance, interpolate, preview, simulate};
+        use super::{areas, clumps, curves, export, groom, instance, interpolate, preview, simulate};
         match what {
             What::Curves => curves::hair(self).map(drop),
             What::Place => groom::placed(self).map(drop),
@@ -408,7 +415,9 @@ impl<'a> Runner<'a> {
             What::Length(i) | What::Width(i) | What::Opacity(i) => instance::column(self, what, i).map(drop),
             What::Color(i) => instance::color(self, i).map(drop),
             What::Simulate(..) => simulate::make(self, what),
-            What::Rest(_) | What::Frame(..) => interpolate::positions(self, what).map(drop),
+            What::Clump(i, k) => clumps::clumps(self, i, k as usize).map(drop),
+            What::Hits(frame) => areas::hits(self, frame).map(drop),
+            What::Rest(_) | What::Finished(_) | What::Frame(..) => interpolate::positions(self, what).map(drop),
             What::Export(format) => export::write(self, what, format),
             What::Still => preview::still(self),
             What::Sheet => preview::sheet(self),

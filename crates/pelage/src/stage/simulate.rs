@@ -206,7 +206,7 @@ fn source(run: &mut Runner<'_>, i: usize) -> Result<Source, Error> {
     let skin = groom::skin(run)?;
     let anchors = |root: &[SurfacePoint]| root.iter().map(|p| p.blend(skin.corners(p)).into()).collect();
     if run.project.target(i) == Target::EveryHair {
-        let (roots, points) = (instance::roots(run, i)?, run.project.points(i));
+        let (roots, points) = (instance::roots(run, i)?, run.project.base_points(i));
         let rest = interpolate::positions(run, What::Rest(i))?;
         let origin = skin.origin();
         let metres = |p: &[f32; 3]| std::array::from_fn(|x| (f64::from(p[x]) + origin[x]) * unit);

@@ -1,0 +1,203 @@
+//! Clumping: hairs are drawn toward the centre hair of their clump.
+//!
+//! Production-pipeline paper §4.2.1, for control vertex i of 3 that move: `delta = percent (f + rate (1 - f))` with
+//! f = i / 3, and `p += delta (centre - p)`. That formula was made for hairs of four points: taken at more points it does
+//! not vanish at the root. So it is evaluated at the paper's four stations, with 0 at the root, and continued between
+//! them: beyond the first third it is the formula itself, below it the parabola that meets it with its slope at rate 1
+//! (and stays the straight line at rate 0). `delta` stays within 0 and 1, grows along the hair at every rate, and is
+//! smooth.
+
+use super::{CHUNK, Param, V3, at_station, lengths, relay, station_weights};
+use crate::look::turn::sin_cos_turn;
+use pelage_geom::rng::{channel, uniform};
+use pelage_geom::{NONE, StrandId};
+use rayon::prelude::*;
+
+/// A level of clumps as it acts on hairs. N hairs, C clumps.
+#[derive(Clone, Copy, Debug)]
+pub struct Clump<'a> {
+    /// \[N\] clump of each hair, or [`NONE`].
+    pub clump: &'a [u32],
+    /// \[N\] where a hair stands in its clump: 0 at the centre, 1 at the rim.
+    pub reach: &'a [f32],
+    /// \[C\] hair that is the centre, and stays; [`NONE`] if the centre line is not a hair.
+    pub centre: &'a [u32],
+    /// How far tips come to the centre's tip: 0 not at all, 1 all the way.
+    pub percent: Param<'a>,
+    /// How early along the hair they come: 0 evenly from root to tip, 1 all within the first third.
+    pub rate: Param<'a>,
+    /// How much less hairs at the rim are drawn than those at the centre, 0 to 1.
+    pub falloff: Param<'a>,
+    /// How far tips leave the centre again, each at random between 0 and this, as a share of the way that they came.
+    pub splay: Param<'a>,
+    /// Turns around the centre from root to tip, each hair at random between minus and plus this.
+    pub weave: Param<'a>,
+    /// Where along the hair it happens: l is replaced by l^(4^taper). Above 0 clumps stay wide until near the tip, below
+    /// they are narrow from the root on.
+    pub taper: f32,
+    /// \[C\] size of the clump's cross-section at a quarter, half, three quarters of the hair and its tip, relative to that
+    /// at the root (streamlines paper §4.5): replaces the rate. Empty: the formula.
+    pub dilation: &'a [[f32; 4]],
+    /// Keep the lengths of segments instead of the points where the formula puts them.
+    pub keep_length: bool,
+    /// \[N\] names of the hairs.
+    pub id: &'a [StrandId],
+    /// With the hair's name keys its random numbers.
+    pub seed: u64,
+}
+
+/// Centre lines of clumps, C times P points: the hairs as they are before this level acts.
+pub fn centre_lines(points: usize, position: &[[f32; 3]], centre: &[u32]) -> Vec<[f32; 3]> {
+    centre.iter().flat_map(|&h| &position[h as usize * points..][..points]).copied().collect()
+}
+
+/// `delta` at the points of a hair for percent 1, as `a + rate b`.
+fn profile(points: usize, taper: f32) -> Vec<[f32; 2]> {
+    let power = libm::exp2(2.0 * f64::from(taper));
+    let at = |k: usize| {
+        let l = k as f64 / (points - 1) as f64;
+        let l = if taper == 0.0 { l } else { libm::pow(l, power) };
+        [l as f32, delta_of_rate(l) as f32]
+    };
+    (0..points).map(at).collect()
+}
+
+/// What rate 1 adds to the straight line at `l`.
+fn delta_of_rate(l: f64) -> f64 {
+    let below = 1.0 - 3.0 * l;
+    if below > 0.0 { 1.0 - below * below - l } else { 1.0 - l }
+}
+
+/// Where splay acts: 0 up to the middle of the hair, 1 at its tip.
+fn splayed(points: usize) -> Vec<f32> {
+    let at = |k: usize| (2.0 * k as f32 / (points - 1) as f32 - 1.0).max(0.0);
+    (0..points).map(|k| at(k) * at(k)).collect()
+}
+
+/// Draws hairs of `points` points toward the lines of their clumps ([`centre_lines`]). A hair with percent 0, without a
+/// clump, or a centre itself keeps its bytes; percent 1 at rate 0 brings a tip onto the centre's exactly.
+pub fn clump(points: usize, c: &Clump, line: &[[f32; 3]], position: &mut [[f32; 3]]) {
+    let (profile, splay) = (profile(points, c.taper), splayed(points));
+    let stations = station_weights(5, points);
+    position.par_chunks_mut(CHUNK * points).enumerate().for_each(|(chunk, out)| {
+        let (mut delta, mut length) = (vec![0.0f32; points], Vec::new());
+        for (h, hair) in (chunk * CHUNK..).zip(out.chunks_exact_mut(points)) {
+            let own = c.clump[h];
+            if own == NONE || c.centre[own as usize] as usize == h {
+                continue;
+            }
+            let percent = c.percent.of(h).clamp(0.0, 1.0) * (1.0 - c.falloff.of(h).clamp(0.0, 1.0) * c.reach[h]);
+            if percent == 0.0 {
+                continue;
+            }
+            if c.keep_length {
+                lengths(hair, &mut length);
+            }
+            if let Some(d) = c.dilation.get(own as usize) {
+                let size = [1.0, d[0], d[1], d[2], d[3]];
+                delta.iter_mut().zip(&stations).for_each(|(x, w)| *x = percent * (1.0 - at_station(w, &size)));
+            } else {
+                let rate = c.rate.of(h).clamp(0.0, 1.0);
+                delta.iter_mut().zip(&profile).for_each(|(x, [a, b])| *x = percent * (a + rate * b));
+            }
+            let open = c.splay.of(h);
+            if open != 0.0 {
+                let open = open * uniform(c.seed, c.id[h], channel("clump splay"), 0) as f32;
+                delta.iter_mut().zip(&splay).for_each(|(x, s)| *x *= 1.0 - open * s);
+            }
+            let line = &line[own as usize * points..][..points];
+            draw(hair, line, &delta);
+            let weave = c.weave.of(h);
+            if weave != 0.0 {
+                let turns = weave * (2.0 * uniform(c.seed, c.id[h], channel("clump weave"), 0) - 1.0) as f32;
+                wind_around(hair, line, turns);
+            }
+            if c.keep_length {
+                relay(hair, &length);
+            }
+        }
+    });
+}
+
+#[inline(always)]
+fn draw(hair: &mut [[f32; 3]], line: &[[f32; 3]], delta: &[f32]) {
+    for ((p, q), &d) in hair.iter_mut().zip(line).zip(delta).skip(1) {
+        // This form meets the centre at 1 without rounding.
+        *p = std::array::from_fn(|x| p[x] * (1.0 - d) + q[x] * d);
+    }
+}
+
+/// Turns a hair around a line, more and more toward the tip.
+fn wind_around(hair: &mut [[f32; 3]], line: &[[f32; 3]], turns: f32) {
+    let last = line.len() - 1;
+    for k in 1..=last {
+        let along = V3::from(line[(k + 1).min(last)]) - V3::from(line[k - 1]);
+        let n = along.norm();
+        if n == 0.0 {
+            continue;
+        }
+        let (sin, cos) = sin_cos_turn(turns * k as f32 / last as f32);
+        let (axis, q) = (along / n, V3::from(line[k]));
+        let o = V3::from(hair[k]) - q;
+        hair[k] = (q + o * cos + axis.cross(&o) * sin + axis * (axis.dot(&o) * (1.0 - cos))).into();
+    }
+}
+
+/// Lines drawn by hand as centres: each rides on a hair (its `carrier`), point by point in that hair's axes, so that it
+/// moves as the hair does. `drawn` holds C times P points (tangent, x, y) from the carrier's, see [`bind_lines`].
+pub fn drawn_lines(
+    points: usize,
+    position: &[[f32; 3]],
+    carrier: &[u32],
+    axes: &[super::axes::RootAxes],
+    drawn: &[[f32; 3]],
+) -> Vec<[f32; 3]> {
+    let mut along = super::axes::Along::default();
+    let mut out = Vec::with_capacity(drawn.len());
+    for (&h, drawn) in carrier.iter().zip(drawn.chunks_exact(points)) {
+        let hair = &position[h as usize * points..][..points];
+        along.set(hair, &axes[h as usize]);
+        for (k, d) in drawn.iter().enumerate() {
+            let (t, x) = (along.tangent[k], along.normal[k]);
+            out.push((V3::from(hair[k]) + t * d[0] + x * d[1] + t.cross(&x) * d[2]).into());
+        }
+    }
+    out
+}
+
+/// Says lines at rest (C times P points) in the axes of their carriers at rest.
+pub fn bind_lines(
+    points: usize,
+    position: &[[f32; 3]],
+    carrier: &[u32],
+    axes: &[super::axes::RootAxes],
+    line: &[[f32; 3]],
+) -> Vec<[f32; 3]> {
+    let mut along = super::axes::Along::default();
+    let mut out = Vec::with_capacity(line.len());
+    for (&h, line) in carrier.iter().zip(line.chunks_exact(points)) {
+        let hair = &position[h as usize * points..][..points];
+        along.set(hair, &axes[h as usize]);
+        for (k, p) in line.iter().enumerate() {
+            let (t, x) = (along.tangent[k], along.normal[k]);
+            let o = V3::from(*p) - V3::from(hair[k]);
+            out.push([t.dot(&o), x.dot(&o), t.cross(&x).dot(&o)]);
+        }
+    }
+    out
+}
+
+/// Sizes of clumps from their root variables (streamlines paper §4.5): mean, deviation and scale at four stations.
+pub fn dilations(r: &[f32], mean: [f32; 4], deviation: [f32; 4], scale: f32, key: u32) -> Vec<[f32; 4]> {
+    let stations = super::wave::Stations { mean, deviation, scale: [scale; 4] };
+    r.iter().map(|r| stations.at(key, *r).map(|x| x.max(0.0))).collect()
+}
+
+/// Multiplies each hair's factors on width and opacity by those of hair of percent 1, as far as it is clumped.
+pub fn wet(c: &Clump, width: f32, opacity: f32, out: &mut [[f32; 2]]) {
+    for (h, out) in out.iter_mut().enumerate().filter(|(h, _)| c.clump[*h] != NONE) {
+        let percent = c.percent.of(h).clamp(0.0, 1.0);
+        out[0] *= 1.0 + (width - 1.0) * percent;
+        out[1] *= 1.0 + (opacity - 1.0) * percent;
+    }
+}

@@ -1,0 +1,65 @@
+//! Wind without simulation: a noise moves the points of hairs (production-pipeline paper §4.3), more toward the tip, and
+//! their lengths stay.
+
+use super::perlin::{key, perlin3};
+use super::{CHUNK, Param, V3, lengths, relay};
+use rayon::prelude::*;
+
+/// How far a gust at a hair's tip is behind one at its root, in gusts: bends run along the hair. At 0 hair moves as a
+/// stiff whole; above about 1 long hair ripples like a flag.
+const LAG: f32 = 0.35;
+
+/// Wind at an instant.
+#[derive(Clone, Copy, Debug)]
+pub struct Wind<'a> {
+    /// How far the tip is moved on average, scene units.
+    pub amplitude: Param<'a>,
+    /// Where it blows to, in the world; its length does not matter.
+    pub direction: [f32; 3],
+    /// Gusts that pass a place in a second.
+    pub frequency: f32,
+    /// Size of a gust, scene units.
+    pub size: f32,
+    /// How much gusts change the wind, 0 to 1: at 0 it is steady.
+    pub gust: f32,
+    /// Seconds.
+    pub time: f64,
+    /// \[N\] rest roots, scene units.
+    pub root: &'a [[f32; 3]],
+    /// Keys the noise.
+    pub seed: u64,
+    /// Names it.
+    pub channel: u64,
+}
+
+/// Blows at hairs of `points` points. Roots and lengths stay; a hair of amplitude 0 keeps its bytes.
+pub fn wind(points: usize, w: &Wind, position: &mut [[f32; 3]]) {
+    let along = V3::from(w.direction);
+    if along.norm() == 0.0 {
+        return;
+    }
+    let along = along.normalize();
+    let smallest = along.iamin();
+    let across = along.cross(&V3::ith(smallest, 1.0)).normalize();
+    let noise = key(w.seed, 0, w.channel);
+    // Gusts travel with the wind (frozen turbulence): one of their size passes in 1 / frequency.
+    let gone = along * (f64::from(w.frequency) * w.time) as f32;
+    position.par_chunks_mut(CHUNK * points).enumerate().for_each(|(chunk, out)| {
+        let mut length = Vec::new();
+        for (h, hair) in (chunk * CHUNK..).zip(out.chunks_exact_mut(points)) {
+            let amplitude = w.amplitude.of(h);
+            if amplitude == 0.0 {
+                continue;
+            }
+            lengths(hair, &mut length);
+            let here = V3::from(w.root[h]) / w.size - gone;
+            for (k, p) in hair.iter_mut().enumerate().skip(1) {
+                let l = k as f32 / (points - 1) as f32;
+                let [a, b] = perlin3(noise, (here - along * (LAG * l)).into());
+                let push = along * (1.0 + w.gust * a) + across * (0.5 * w.gust * b);
+                *p = (V3::from(*p) + push * (amplitude * l * l)).into();
+            }
+            relay(hair, &length);
+        }
+    });
+}

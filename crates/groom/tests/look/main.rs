@@ -1,0 +1,8 @@
+//! The look against its formulas said plainly, and its laws: what stays where nothing is asked for, what moves with the
+//! skin, what lengths are kept.
+
+mod clumps;
+mod common;
+mod curls;
+mod membership;
+mod waves;

@@ -1,0 +1,189 @@
+//! Clumps: which hairs of a layer belong together, once per groom.
+
+use super::run::{Counts, Runner};
+use super::skin::Texel;
+use super::tables::{decode, encode, table};
+use super::{What, groom, instance, layer_seed, plan_look::joins_clumps};
+use crate::Error;
+use crate::config::{Clump, LookValue, MapRef};
+use crate::format::ply::Column;
+use pelage_geom::{NONE, TiledMap, Vec3, rng};
+use pelage_groom::instance::Roots;
+use pelage_groom::look::member::{
+    Members, Sites, centres, members, nearest_hairs, representatives, rest_sites, sides, whole_clumps,
+};
+use pelage_groom::look::region::regions;
+use pelage_groom::look::vary::{Drawn, Scale, Vary, factors};
+use std::rc::Rc;
+
+/// Map value from which an area counts.
+const INSIDE: f32 = 0.5;
+
+/// Rest roots of a layer's hairs, relative to the skin's origin, and normals there.
+#[derive(Debug)]
+pub struct RestSites {
+    pub position: Vec<[f32; 3]>,
+    pub normal: Vec<[f32; 3]>,
+}
+
+/// Rest roots of a layer, kept for the run.
+pub fn sites(run: &mut Runner<'_>, i: usize) -> Result<Rc<RestSites>, Error> {
+    if let Some(found) = run.sites.get(&i) {
+        return Ok(found.clone());
+    }
+    let (skin, roots) = (groom::skin(run)?, instance::roots(run, i)?);
+    let (position, normal) = rest_sites(&groom::view(&skin), &roots.root, skin.origin());
+    let found = Rc::new(RestSites { position, normal });
+    run.sites.insert(i, found.clone());
+    Ok(found)
+}
+
+/// Factors by which a parameter varies over a layer's hairs.
+pub fn varied(run: &mut Runner<'_>, hairs: &Drawn<'_>, name: &str, v: &LookValue) -> Result<Vec<f32>, Error> {
+    let map = v.map().map(|m| run.map(&m, Texel::Value)).transpose()?;
+    Ok(factors(hairs, &vary(v, map.as_ref(), &scales(v), name)))
+}
+
+/// Scales of a parameter as numbers of single precision.
+pub fn scales(v: &LookValue) -> Vec<Scale> {
+    v.0.vary.iter().map(|s| Scale { size: s.size as f32, deviation: s.deviation as f32 }).collect()
+}
+
+/// How a parameter of that name varies.
+pub fn vary<'a>(v: &LookValue, map: Option<&'a TiledMap>, scales: &'a [Scale], name: &str) -> Vary<'a> {
+    Vary { map, noise: v.0.noise as f32, scales, channel: rng::channel(name) }
+}
+
+/// Clumps of a layer's level.
+pub fn clumps(run: &mut Runner<'_>, i: usize, k: usize) -> Result<Rc<Members>, Error> {
+    if let Some(found) = run.members.get(&(i, k)) {
+        return Ok(found.clone());
+    }
+    let what = What::Clump(i, k as u32);
+    let found = match run.fetch(what).and_then(|e| read(e.payload.first()?)) {
+        Some(found) => found,
+        None => find(run, i, k, what)?,
+    };
+    let found = Rc::new(found);
+    run.members.insert((i, k), found.clone());
+    Ok(found)
+}
+
+fn find(run: &mut Runner<'_>, i: usize, k: usize, what: What) -> Result<Members, Error> {
+    let groom = &run.project.groom.value;
+    let (layer, c) = (&groom.layer[i], groom.layer[i].clump[k].clone());
+    let (name, hair_density) = (layer.name.clone(), layer.density.value);
+    let (roots, at) = (instance::roots(run, i)?, sites(run, i)?);
+    let open = match &c.area {
+        Some(area) => {
+            let map = run.map(area, Texel::Value)?;
+            roots.uv.iter().map(|uv| map.value(*uv) >= INSIDE).collect()
+        }
+        None => Vec::new(),
+    };
+    let cm2 = run.project.cm2_per_unit2();
+    let hairs = Drawn { id: &roots.id, uv: &roots.uv, position: &at.position, seed: u64::from(layer_seed(&name)) };
+    // Scene units between clumps, as far as the level says: what a size is when none is given covers every gap.
+    let spacing = c.density.as_ref().map(|d| 1.0 / (d.at(0.0).max(1e-9) * cm2).sqrt());
+    let size = c.size.clone().unwrap_or_else(|| LookValue::constant(match (spacing, &c.regions) {
+        (Some(s), _) => 4.0 * s,
+        (None, Some(_)) => 2.0 / (hair_density.max(1e-9) * cm2).sqrt(),
+        (None, None) => 1.0,
+    }));
+    let factor = varied(run, &hairs, "size", &size)?;
+    let radius = |h: u32| (size.at(0.0) as f32) * factor.get(h as usize).unwrap_or(&1.0);
+    let partings: Vec<Vec<Vec3>> = groom::partings(run);
+    let mut sites = Sites { position: &at.position, normal: &at.normal, side: &[] };
+    let most = f64::from((0..roots.id.len() as u32).map(radius).fold(0.0f32, f32::max));
+    let origin = groom::skin(run)?.origin();
+    let relative: Vec<Vec<Vec3>> =
+        partings.iter().map(|l| l.iter().map(|p| p - Vec3::from(origin)).collect()).collect();
+    let side = sides(&relative, most, &sites);
+    sites.side = &side;
+    let before = if joins_clumps(&c, k) { Some(clumps(run, i, k - 1)?) } else { None };
+    let found = if c.regions.is_some() {
+        in_regions(run, &c, &roots, &sites, size.at(0.0) as f32, &open)?
+    } else {
+        let stands = before.as_ref().map(|b| representatives(b)).unwrap_or_default();
+        let may: Vec<bool> = match (open.is_empty(), stands.is_empty()) {
+            (_, true) => open,
+            (true, false) => stands,
+            (false, false) => open.iter().zip(&stands).map(|(a, b)| *a && *b).collect(),
+        };
+        let centre = centre_hairs(run, &c, &hairs, &roots, &may, &format!("layer[{i}].clump[{k}]"))?;
+        let radii: Vec<f32> = centre.iter().map(|h| radius(*h)).collect();
+        let spacing = spacing.map_or(most as f32, |s| s as f32);
+        let found = members(&sites, centre, &radii, spacing, &may);
+        match &before {
+            Some(fine) => whole_clumps(&sites, fine, &radii, found),
+            None => found,
+        }
+    };
+    let loose = found.clump.iter().filter(|c| **c == NONE).count();
+    let counts = Counts::from([
+        (format!("clumps in level {k} of layer {name}"), found.centre.len() as u64),
+        (format!("hairs without a clump in level {k} of layer {name}"), loose as u64),
+    ]);
+    run.keep(what, counts, &[("data.ply", &write(&found))])?;
+    Ok(found)
+}
+
+/// Hairs that are centres.
+fn centre_hairs(
+    run: &mut Runner<'_>,
+    c: &Clump,
+    hairs: &Drawn<'_>,
+    roots: &Roots,
+    open: &[bool],
+    at: &str,
+) -> Result<Vec<u32>, Error> {
+    let origin = groom::skin(run)?.origin();
+    let by_hand = c.roots.iter().flatten().copied().chain(c.curves.iter().flatten().map(|l| l[0]));
+    let by_hand: Vec<[f32; 3]> = by_hand.map(|p| std::array::from_fn(|x| (p[x] - origin[x]) as f32)).collect();
+    if !by_hand.is_empty() {
+        if roots.id.is_empty() {
+            return Ok(Vec::new());
+        }
+        let found = nearest_hairs(hairs.position, &by_hand);
+        if let Some(k) = (1..found.len()).find(|k| found[..*k].contains(&found[*k])) {
+            let what = format!("number {k} of a clump placed by hand has the same nearest hair as one before it");
+            return Err(run.project.groom.error(at, what, "place them farther apart, or grow more hair there").into());
+        }
+        return Ok(found);
+    }
+    let density = c.density.as_ref().expect("checked: clumps have a density");
+    let value = density.at(0.0) * run.project.cm2_per_unit2();
+    let factor = varied(run, hairs, "density", density)?;
+    let area = groom::skin(run)?.area();
+    Ok(centres(&roots.id, area, &|h| value * f64::from(*factor.get(h).unwrap_or(&1.0)), open))
+}
+
+fn in_regions(
+    run: &mut Runner<'_>,
+    c: &Clump,
+    roots: &Roots,
+    sites: &Sites<'_>,
+    near: f32,
+    open: &[bool],
+) -> Result<Members, Error> {
+    let map: &MapRef = c.regions.as_ref().expect("a level of regions");
+    let map = run.map(map, Texel::Value)?;
+    let value: Vec<f32> = roots.uv.iter().map(|uv| map.nearest(*uv)).collect();
+    Ok(regions(sites, &value, near, open))
+}
+
+fn write(m: &Members) -> Vec<u8> {
+    let hair = vec![("clump", Column::U32(m.clump.clone())), ("reach", Column::F32(m.reach.clone()))];
+    let comment = format!("clump of every hair ({NONE}: none) and where it stands in it; centre hair of every clump");
+    encode(&comment, &[table("hair", hair), table("clump", vec![("centre", Column::U32(m.centre.clone()))])])
+}
+
+fn read(bytes: &[u8]) -> Option<Members> {
+    let file = decode(bytes)?;
+    let hair = file.get("hair")?;
+    Some(Members {
+        centre: file.get("clump")?.u32("centre")?.to_vec(),
+        clump: hair.u32("clump")?.to_vec(),
+        reach: hair.f32("reach")?.to_vec(),
+    })
+}

@@ -1,0 +1,459 @@
+//! The look: what displaces a layer's hairs at rest or at a frame, part after part.
+
+use super::clumps::{self, RestSites};
+use super::plan_look::{Effect, collides, effects, overridden};
+use super::run::{Counts, Runner};
+use super::skin::Texel;
+use super::{Skin, SkinPose, What, groom, instance, interpolate, layer_seed};
+use crate::Error;
+use crate::config::{self, CurlKind, LookValue, WaveShape};
+use crate::project::SkinAt;
+use pelage_geom::{NONE, Vec3, rng};
+use pelage_groom::instance::Roots;
+use pelage_groom::look::axes::{RootAxes, carried, rest_axes};
+use pelage_groom::look::clump::{Clump, bind_lines, centre_lines, clump, dilations, drawn_lines, wet};
+use pelage_groom::look::curl::{Curl, Wave as CurlWave, curl, dished, helix, uniplanar};
+use pelage_groom::look::member::Members;
+use pelage_groom::look::noise::{Noise, noise};
+use pelage_groom::look::refine::refine;
+use pelage_groom::look::vary::{Drawn, factors, shifts};
+use pelage_groom::look::wave::{Axis, RootVariable, Shape, Stations, Waves, root_variable, wave};
+use pelage_groom::look::wind::{Wind, wind};
+use pelage_groom::look::{Param, perlin};
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+/// Points a turn below which a curl is drawn with visible corners.
+const SMOOTH: f64 = 8.0;
+
+/// What the look reads of a layer that does not change over the shot.
+#[derive(Debug, Default)]
+pub struct LayerLook {
+    /// Factors or shifts of parameters, by operator and key.
+    column: BTreeMap<String, Vec<f32>>,
+    /// Axes of the roots at rest, in their root frames; empty if nothing needs them.
+    axes: Vec<RootAxes>,
+    /// Lines drawn by hand, in the axes of their carriers, by level.
+    drawn: BTreeMap<usize, Vec<[f32; 3]>>,
+}
+
+/// Hairs as they are displaced.
+pub struct Displaced {
+    /// Points, scene units relative to the skin's origin.
+    pub position: Vec<[f32; 3]>,
+    /// Factors on width and opacity of each hair; empty if nothing is wet.
+    pub wet: Vec<[f32; 2]>,
+}
+
+/// Hairs that come into a step as they leave it: with their finished number of points, displaced, out of the skin.
+pub fn finish(
+    run: &mut Runner<'_>,
+    what: What,
+    frame: Option<i32>,
+    at: &SkinAt,
+    base: Vec<[f32; 3]>,
+    counts: &mut Counts,
+) -> Result<Displaced, Error> {
+    let (acting, last) = run.plan.step(what).look(run.project);
+    let i = what.layer().expect("hairs are of a layer");
+    let from = run.project.base_points(i);
+    let points = if last { run.project.points(i) } else { from };
+    let skin = groom::skin(run)?;
+    let pose = skin.pose(at)?;
+    let mut out = Displaced { position: base, wet: Vec::new() };
+    out.position = refined(out.position, from, points);
+    if !acting.is_empty() {
+        let look = prepared(run, what, &acting, points, &out.position)?;
+        let roots = instance::roots(run, i)?;
+        let axes = match look.axes.is_empty() {
+            true => Vec::new(),
+            false => carried(&skin.mesh, &skin.topology, &pose, &roots.root, &look.axes),
+        };
+        let sites = clumps::sites(run, i)?;
+        let mut job = Job { i, points, frame, look: &look, axes: &axes, roots: &roots, sites: &sites, out: &mut out };
+        for effect in acting {
+            job.act(run, effect)?;
+        }
+    }
+    if last && collides(run.project, i) {
+        collide(run, i, at, &pose, &mut out.position, counts)?;
+    }
+    Ok(out)
+}
+
+/// Pushes finished hairs out of the skin.
+fn collide(
+    _run: &mut Runner<'_>,
+    _i: usize,
+    _at: &SkinAt,
+    _pose: &SkinPose,
+    _position: &mut [[f32; 3]],
+    _counts: &mut Counts,
+) -> Result<(), Error> {
+    Ok(())
+}
+
+/// What does not change over the shot, made once a run for each set of parts: at rest and for the frames. `now` are the
+/// hairs that come into the step.
+fn prepared(
+    run: &mut Runner<'_>,
+    what: What,
+    acting: &[Effect],
+    points: usize,
+    now: &[[f32; 3]],
+) -> Result<Rc<LayerLook>, Error> {
+    let i = what.layer().expect("hairs are of a layer");
+    let shaping = matches!(what, What::Rest(_));
+    if let Some(found) = run.looks.get(&(i, shaping)) {
+        return Ok(found.clone());
+    }
+    let skin = groom::skin(run)?;
+    let (roots, sites) = (instance::roots(run, i)?, clumps::sites(run, i)?);
+    let mut look = LayerLook::default();
+    let mut rest = Vec::new();
+    if acting.iter().any(|e| e.has_axes(run.project, i)) {
+        rest = match what {
+            What::Frame(..) => refined(interpolate::undisplaced(run, i)?, run.project.base_points(i), points),
+            _ => now.to_vec(),
+        };
+        look.axes = rest_axes(&skin.mesh, &skin.topology, &skin.rest, &roots.root, points, &rest);
+    }
+    for effect in acting {
+        columns(run, i, *effect, &roots, &sites, &mut look)?;
+        if let Effect::Clump(k) = effect {
+            let members = clumps::clumps(run, i, *k)?;
+            bind(run, i, *k, &skin, &members, points, &rest, &mut look);
+        }
+    }
+    note_coarse_curls(run, i, acting, points)?;
+    let look = Rc::new(look);
+    run.looks.insert((i, shaping), look.clone());
+    Ok(look)
+}
+
+fn refined(position: Vec<[f32; 3]>, from: usize, to: usize) -> Vec<[f32; 3]> {
+    if from == to { position } else { refine(from, to, &position) }
+}
+
+/// Lines drawn by hand for a level, said in the axes of the hairs that carry them.
+fn bind(
+    run: &Runner<'_>,
+    i: usize,
+    k: usize,
+    skin: &Skin,
+    members: &Members,
+    points: usize,
+    rest: &[[f32; 3]],
+    look: &mut LayerLook,
+) {
+    let Some(lines) = &run.project.groom.value.layer[i].clump[k].curves else { return };
+    let origin = Vec3::from(skin.origin());
+    let sampled = |line: &Vec<[f64; 3]>| {
+        let line: Vec<Vec3> = line.iter().map(|p| Vec3::from(*p) - origin).collect();
+        pelage_geom::curve::resample(&line, points)
+    };
+    let flat: Vec<[f32; 3]> =
+        lines.iter().flat_map(sampled).map(|p| [p.x as f32, p.y as f32, p.z as f32]).collect();
+    look.drawn.insert(k, bind_lines(points, rest, &members.centre, &look.axes, &flat));
+}
+
+/// Columns of a part's parameters.
+fn columns(
+    run: &mut Runner<'_>,
+    i: usize,
+    effect: Effect,
+    roots: &Roots,
+    sites: &RestSites,
+    look: &mut LayerLook,
+) -> Result<(), Error> {
+    let project = run.project;
+    let layer = &project.groom.value.layer[i];
+    let (key, seed) = (effect.key(), u64::from(layer_seed(&layer.name)));
+    let own = Drawn { id: &roots.id, uv: &roots.uv, position: &sites.position, seed };
+    let of_clump = match (effect, &layer.curl) {
+        (Effect::Curl, Some(c)) if c.per_clump => Some(representatives(run, i)?),
+        _ => None,
+    };
+    let of = |h: &u32| *h as usize;
+    let (id, uv, position): (Vec<_>, Vec<_>, Vec<_>) = match &of_clump {
+        Some(r) => (
+            r.iter().map(|h| roots.id[of(h)]).collect(),
+            r.iter().map(|h| roots.uv[of(h)]).collect(),
+            r.iter().map(|h| sites.position[of(h)]).collect(),
+        ),
+        None => Default::default(),
+    };
+    let hairs = if of_clump.is_some() { Drawn { id: &id, uv: &uv, position: &position, seed } } else { own };
+    for (_, v) in layer.varied().into_iter().filter(|(k, _)| *k == key) {
+        if matches!((effect, v.name), (Effect::Clump(_), "density" | "size")) {
+            continue;
+        }
+        let name = format!("{key}.{}", v.name);
+        let map = v.value.map().map(|m| run.map(&m, Texel::Value)).transpose()?;
+        let scales = clumps::scales(v.value);
+        let vary = clumps::vary(v.value, map.as_ref(), &scales, &name);
+        let column = if v.added { shifts(&hairs, &vary) } else { factors(&hairs, &vary) };
+        look.column.insert(name, column);
+    }
+    if let Effect::Wave(k) = effect {
+        let w = &layer.wave[k];
+        let map = w.map.as_ref().map(|m| run.map(m, Texel::Value)).transpose()?;
+        let channel = rng::channel(&key);
+        let v = RootVariable { map: map.as_ref(), size: w.size as f32, stray: w.stray as f32, channel };
+        look.column.insert(format!("{key}.r"), root_variable(&own, &v));
+    }
+    Ok(())
+}
+
+/// For each hair the centre of its clump in the last level, or itself.
+fn representatives(run: &mut Runner<'_>, i: usize) -> Result<Vec<u32>, Error> {
+    let levels = run.project.groom.value.layer[i].clump.len();
+    let [simulated, after] = effects(run.project, i);
+    let acts = |k: &usize| simulated.iter().chain(&after).any(|e| *e == Effect::Clump(*k));
+    let Some(last) = (0..levels).rev().find(acts) else {
+        return Ok((0..instance::roots(run, i)?.id.len() as u32).collect());
+    };
+    let m = clumps::clumps(run, i, last)?;
+    Ok(m.clump.iter().enumerate().map(|(h, c)| if *c == NONE { h as u32 } else { m.centre[*c as usize] }).collect())
+}
+
+/// Curls that the hair has too few points to draw are told.
+fn note_coarse_curls(run: &mut Runner<'_>, i: usize, acting: &[Effect], points: usize) -> Result<(), Error> {
+    let project = run.project;
+    let layer = &project.groom.value.layer[i];
+    let Some(c) = layer.curl.as_ref().filter(|c| acting.contains(&Effect::Curl) && c.kind != CurlKind::Custom) else {
+        return Ok(());
+    };
+    let length = instance::column(run, What::Length(i), i)?;
+    let longest = length.iter().fold(0.0f32, |a, b| a.max(*b));
+    let pitch = c.pitch.as_ref().map_or(1.0, |p| p.at(project.moment(None)));
+    let turns = f64::from(longest) / pitch;
+    let found = (points - 1) as f64 / turns;
+    if turns > 0.0 && found < SMOOTH {
+        let enough = (turns * 2.0 * SMOOTH).ceil() as usize + 1;
+        run.warnings.push(format!(
+            "layer {}: a turn of its curls has {found:.1} segments on the longest hair: layer.points = {enough} draws \
+             them round",
+            layer.name
+        ));
+    }
+    Ok(())
+}
+
+/// One layer at one moment.
+struct Job<'a, 'b> {
+    i: usize,
+    points: usize,
+    /// `None` at rest.
+    frame: Option<i32>,
+    look: &'a LayerLook,
+    axes: &'a [RootAxes],
+    roots: &'a Roots,
+    sites: &'a RestSites,
+    out: &'b mut Displaced,
+}
+
+impl<'a> Job<'a, '_> {
+    /// A parameter at this moment.
+    fn param(&self, run: &Runner<'_>, effect: Effect, name: &str, v: &LookValue) -> Param<'a> {
+        let value = v.at(run.project.moment(self.frame)) as f32;
+        let column = self.look.column.get(&format!("{}.{name}", effect.key())).map_or(&[][..], Vec::as_slice);
+        let added = matches!((effect, name), (Effect::Curl, "phase" | "angle"));
+        if added { Param { value, factor: &[], shift: column } } else { Param { value, factor: column, shift: &[] } }
+    }
+
+    fn act(&mut self, run: &mut Runner<'_>, effect: Effect) -> Result<(), Error> {
+        let project = run.project;
+        let layer = &project.groom.value.layer[self.i];
+        let seed = u64::from(layer_seed(&layer.name));
+        let channel = rng::channel(&effect.key());
+        let points = self.points;
+        match effect {
+            Effect::Clump(k) => self.clump(run, k, seed)?,
+            Effect::Curl => {
+                let c = layer.curl.as_ref().expect("the layer has curls");
+                let one = LookValue::constant(1.0);
+                let profile = single(c.profile.as_deref());
+                let settings = Curl {
+                    wave: wave_of(c),
+                    radius: self.param(run, effect, "radius", c.radius.as_ref().unwrap_or(&one)),
+                    pitch: self.param(run, effect, "pitch", c.pitch.as_ref().unwrap_or(&one)),
+                    phase: self.param(run, effect, "phase", &c.phase),
+                    angle: self.param(run, effect, "angle", &c.angle),
+                    tighten: self.param(run, effect, "tighten", &c.tighten),
+                    start: c.start as f32,
+                    profile: &profile,
+                    keep_length: c.keep_length,
+                    axes: self.axes,
+                };
+                curl(points, &settings, &mut self.out.position);
+            }
+            Effect::Wave(k) => {
+                let w = &layer.wave[k];
+                let settings = Waves {
+                    shape: if w.shape == WaveShape::Sine { Shape::Sine } else { Shape::Noise },
+                    axis: [axis_of(&w.x), axis_of(&w.y)],
+                    strength: self.param(run, effect, "strength", &w.strength),
+                    r: &self.look.column[&format!("{}.r", effect.key())],
+                    keep_length: w.keep_length,
+                    axes: self.axes,
+                    seed,
+                    channel,
+                };
+                wave(points, &settings, &mut self.out.position);
+            }
+            Effect::Noise(k) => {
+                let n = &layer.noise[k];
+                let profile = single(n.profile.as_deref());
+                let settings = Noise {
+                    amplitude: self.param(run, effect, "amplitude", &n.amplitude),
+                    size: n.size as f32,
+                    across: n.across as f32,
+                    profile: &profile,
+                    keep_length: n.keep_length,
+                    id: &self.roots.id,
+                    root: &self.sites.position,
+                    axes: self.axes,
+                    seed,
+                    channel,
+                };
+                noise(points, &settings, &mut self.out.position);
+            }
+            // The rest pose is without wind.
+            Effect::Wind if self.frame.is_none() => {}
+            Effect::Wind => {
+                let w = layer.wind.as_ref().expect("the layer has wind");
+                let settings = Wind {
+                    amplitude: self.param(run, effect, "amplitude", &w.amplitude),
+                    direction: w.direction.map(|x| x as f32),
+                    frequency: w.frequency as f32,
+                    size: w.size as f32,
+                    gust: w.gust as f32,
+                    time: project.seconds(self.frame),
+                    root: &self.sites.position,
+                    seed,
+                    channel,
+                };
+                wind(points, &settings, &mut self.out.position);
+            }
+        }
+        Ok(())
+    }
+
+    fn clump(&mut self, run: &mut Runner<'_>, k: usize, seed: u64) -> Result<(), Error> {
+        let project = run.project;
+        let layer = &project.groom.value.layer[self.i];
+        let (c, effect, points) = (&layer.clump[k], Effect::Clump(k), self.points);
+        let m = clumps::clumps(run, self.i, k)?;
+        let moment = project.moment(self.frame);
+        let mut params = [Param::default(); 5];
+        for (p, v) in params.iter_mut().zip(c.varied()) {
+            *p = self.param(run, effect, v.name, v.value);
+            if let Some((_, keyed)) = overridden(project, self.i, k, &v) {
+                p.value = keyed.at(moment) as f32;
+            }
+        }
+        let [mut percent, mut rate, falloff, splay, weave] = params;
+        let areas = match (c.areas.is_empty(), self.frame) {
+            (true, _) => None,
+            (false, None) => return Ok(()),
+            (false, Some(frame)) => Some(super::areas::strengths(run, self.i, k, frame, &m, self.sites)?),
+        };
+        if let Some([area_percent, area_rate]) = &areas {
+            (percent, rate) = (in_areas(area_percent), in_areas(area_rate));
+        }
+        let dilation = c.dilation.as_ref().map(|d| dilation(run, self.i, k, d, &m, self.roots)).transpose()?;
+        let drawn = self.look.drawn.get(&k);
+        let line = match drawn {
+            Some(d) => drawn_lines(points, &self.out.position, &m.centre, self.axes, d),
+            None => centre_lines(points, &self.out.position, &m.centre),
+        };
+        let moving = vec![NONE; if drawn.is_some() { m.centre.len() } else { 0 }];
+        let settings = Clump {
+            clump: &m.clump,
+            reach: &m.reach,
+            centre: if drawn.is_some() { &moving } else { &m.centre },
+            percent,
+            rate,
+            falloff,
+            splay,
+            weave,
+            taper: c.taper as f32,
+            dilation: dilation.as_deref().unwrap_or_default(),
+            keep_length: c.keep_length,
+            id: &self.roots.id,
+            seed: seed ^ rng::channel(&effect.key()),
+        };
+        clump(points, &settings, &line, &mut self.out.position);
+        if let Some(w) = &c.wet {
+            self.out.wet.resize(self.roots.id.len(), [1.0; 2]);
+            wet(&settings, w.width as f32, w.opacity as f32, &mut self.out.wet);
+        }
+        Ok(())
+    }
+}
+
+/// Values by hair as a parameter.
+fn in_areas(column: &[f32]) -> Param<'_> {
+    Param { value: 1.0, factor: column, shift: &[] }
+}
+
+/// Sizes of the clumps of a level by their root variable: the regions' value, or a number of each clump's own.
+fn dilation(
+    run: &mut Runner<'_>,
+    i: usize,
+    k: usize,
+    d: &config::Dilation,
+    m: &Members,
+    roots: &Roots,
+) -> Result<Vec<[f32; 4]>, Error> {
+    let layer = &run.project.groom.value.layer[i];
+    let (seed, c) = (u64::from(layer_seed(&layer.name)), &layer.clump[k]);
+    let channel = rng::channel(&format!("clump[{k}].dilation"));
+    let map = c.regions.as_ref().map(|r| run.map(r, Texel::Value)).transpose()?;
+    let of = |h: &u32| match &map {
+        Some(map) => map.nearest(roots.uv[*h as usize]),
+        None => rng::uniform(seed, roots.id[*h as usize], channel, 0) as f32,
+    };
+    let r: Vec<f32> = m.centre.iter().map(of).collect();
+    let single = |v: [f64; 4]| v.map(|x| x as f32);
+    Ok(dilations(&r, single(d.mean), single(d.deviation), d.scale as f32, perlin::key(seed, 0, channel)))
+}
+
+fn single(v: Option<&[f64]>) -> Vec<f32> {
+    v.unwrap_or_default().iter().map(|x| *x as f32).collect()
+}
+
+fn wave_of(c: &config::Curl) -> [CurlWave; 2] {
+    let custom = |w: &Option<config::CurlWave>| {
+        let [a, b, alpha, c, beta, d, gamma, t0, r, p0, phase, bias] =
+            w.as_ref().map_or([0.0; 12], |w| w.values().map(|(_, x)| x as f32));
+        CurlWave { a, b, alpha, c, beta, d, gamma, t0, r, p0, phase, bias }
+    };
+    match c.kind {
+        CurlKind::Helix => helix(),
+        CurlKind::Uniplanar => uniplanar(),
+        CurlKind::Dished => dished(c.depth.unwrap_or(0.5) as f32),
+        CurlKind::Custom => [custom(&c.x), custom(&c.y)],
+    }
+}
+
+fn axis_of(a: &config::WaveAxis) -> Axis {
+    let stations = |mean: [f64; 4], deviation: [f64; 4], scale: [f64; 4]| {
+        let single = |v: [f64; 4]| v.map(|x| x as f32);
+        Stations { mean: single(mean), deviation: single(deviation), scale: single(scale) }
+    };
+    Axis {
+        amplitude: stations(a.amplitude, a.amplitude_deviation, a.amplitude_scale),
+        frequency: stations(a.frequency, a.frequency_deviation, a.frequency_scale),
+        phase: [a.phase as f32, a.phase_deviation as f32, a.phase_scale as f32],
+    }
+}
+
+/// True if a step of a layer needs more than the hairs that come into it.
+pub fn acts(run: &Runner<'_>, what: What) -> bool {
+    let i = what.layer().expect("hairs are of a layer");
+    let (acting, last) = run.plan.step(what).look(run.project);
+    let refined = last && run.project.points(i) != run.project.base_points(i);
+    !acting.is_empty() || refined || (last && collides(run.project, i))
+}

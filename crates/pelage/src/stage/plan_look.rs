@@ -1,0 +1,358 @@
+//! What the look reads: clumps, and what displaces the hairs of a frame.
+
+use super::Stage;
+use super::plan::{Plan, Reader, Step, What, layer_seed, version};
+use crate::cache::{Field, Recipe};
+use crate::config::{Clump, ClumpOf, Keyed, LookValue, Operator, Target, Varied};
+use crate::project::{Project, SkinAt};
+
+/// A part of the look that acts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effect {
+    /// A level of clumps.
+    Clump(usize),
+    /// Curls.
+    Curl,
+    /// Waves of that number.
+    Wave(usize),
+    /// Noise of that number.
+    Noise(usize),
+    /// Wind.
+    Wind,
+}
+
+impl Effect {
+    /// True if it displaces along axes across the hair, which the skin carries.
+    pub fn has_axes(self, project: &Project, i: usize) -> bool {
+        match self {
+            Effect::Clump(k) => project.groom.value.layer[i].clump[k].curves.is_some(),
+            Effect::Curl | Effect::Wave(_) | Effect::Noise(_) => true,
+            Effect::Wind => false,
+        }
+    }
+
+    /// Its key below the layer's.
+    pub fn key(self) -> String {
+        match self {
+            Effect::Clump(k) => format!("clump[{k}]"),
+            Effect::Curl => "curl".to_owned(),
+            Effect::Wave(k) => format!("wave[{k}]"),
+            Effect::Noise(k) => format!("noise[{k}]"),
+            Effect::Wind => "wind".to_owned(),
+        }
+    }
+}
+
+/// Parts of a layer's look in their order: those that the simulation gets as the hair's shape, and those that act on every
+/// frame.
+pub fn effects(project: &Project, i: usize) -> [Vec<Effect>; 2] {
+    let layer = &project.groom.value.layer[i];
+    let shot = &project.shot.value;
+    let every = project.target(i) == Target::EveryHair;
+    let windy = project.target(i) != Target::Off && shot.simulate.wind.is_some();
+    let mut out = [Vec::new(), Vec::new()];
+    for operator in layer.order().into_iter().filter(|o| shot.look.has(*o)) {
+        let mut add = |effect, simulated: bool| out[usize::from(!(simulated && every))].push(effect);
+        match operator {
+            Operator::Clump => layer.clump.iter().enumerate().for_each(|(k, c)| add(Effect::Clump(k), c.simulate)),
+            Operator::Curl => layer.curl.iter().for_each(|c| add(Effect::Curl, c.simulate)),
+            Operator::Wave => layer.wave.iter().enumerate().for_each(|(k, w)| add(Effect::Wave(k), w.simulate)),
+            Operator::Noise => layer.noise.iter().enumerate().for_each(|(k, n)| add(Effect::Noise(k), n.simulate)),
+            Operator::Wind => {
+                layer.wind.iter().filter(|w| !windy || w.with_simulated).for_each(|_| add(Effect::Wind, false));
+            }
+        }
+    }
+    out
+}
+
+/// True if finished hairs of a layer are kept out of the skin. Hair from a curves file is taken as it is.
+pub fn collides(project: &Project, i: usize) -> bool {
+    project.curves.is_none() && project.shot.value.look.collision && project.groom.value.layer[i].collision.enabled
+}
+
+/// True if a layer's hairs change after they are simulated or interpolated.
+fn is_finished_later(project: &Project, i: usize) -> bool {
+    !effects(project, i)[1].is_empty() || collides(project, i) || project.points(i) != project.base_points(i)
+}
+
+/// The step that makes a layer's finished hairs at the rest pose.
+pub fn finished_rest(project: &Project, i: usize) -> What {
+    let simulated = project.target(i) == Target::EveryHair;
+    if simulated && is_finished_later(project, i) { What::Finished(i) } else { What::Rest(i) }
+}
+
+/// The value of a clump's parameter in this shot, and the key that says it.
+pub fn overridden<'a>(project: &'a Project, i: usize, k: usize, v: &Varied<'a>) -> Option<(String, &'a Keyed<f64>)> {
+    let layer = &project.groom.value.layer[i].name;
+    let all = project.shot.value.look.overrides.iter().enumerate().rev();
+    all.filter(|(_, o)| o.layer == *layer && o.clump == k).find_map(|(j, o)| {
+        let value = match v.name {
+            "percent" => o.percent.as_ref(),
+            "rate" => o.rate.as_ref(),
+            _ => None,
+        };
+        value.map(|value| (format!("look.override[{j}].{}", v.name), value))
+    })
+}
+
+/// True if a level of clumps joins the clumps of the level before.
+pub fn joins_clumps(clump: &Clump, k: usize) -> bool {
+    let default = if k == 0 { ClumpOf::Hairs } else { ClumpOf::Clumps };
+    let by_hand = clump.roots.is_some() || clump.curves.is_some();
+    clump.of.unwrap_or(if by_hand { ClumpOf::Hairs } else { default }) == ClumpOf::Clumps
+}
+
+impl Plan {
+    /// Steps that make a layer's clumps.
+    pub(super) fn add_clumps(&mut self, r: &Reader<'_>, i: usize) {
+        let layer = &r.project.groom.value.layer[i];
+        let [simulated, after] = effects(r.project, i);
+        for k in (0..layer.clump.len()).filter(|k| simulated.iter().chain(&after).any(|e| *e == Effect::Clump(*k))) {
+            let what = What::Clump(i, k as u32);
+            let mut reads = vec![What::Roots(i)];
+            reads.extend(joins_clumps(&layer.clump[k], k).then(|| What::Clump(i, k as u32 - 1)));
+            let name = format!("instance/clump[{k}]/{}", layer.name);
+            self.add(what, name, Stage::Instance, r.clump(i, k), &reads);
+        }
+    }
+
+    /// Steps that find where particles hit the skin, frame after frame.
+    pub(super) fn add_hits(&mut self, r: &Reader<'_>) {
+        if !r.project.has_areas() {
+            return;
+        }
+        let mut before: Option<What> = None;
+        for (frame, at) in &r.project.frames {
+            let recipe = r.skin(r.rest(r.hits()), at, *frame).param("frame", frame, "the frame's number");
+            let what = What::Hits(*frame);
+            self.add(what, format!("interpolate/areas/{frame}"), Stage::Interpolate, recipe, before.as_slice());
+            before = Some(what);
+        }
+    }
+
+    /// Adds a step that makes hairs of a layer, displaced by `effects`; `frame` is `None` for the rest pose.
+    pub(super) fn add_hairs(&mut self, r: &Reader<'_>, step: Hairs<'_>, mut reads: Vec<What>) {
+        let Hairs { what, name, mut recipe, effects, last, frame, skin } = step;
+        let i = what.layer().expect("hairs are of a layer");
+        for effect in effects {
+            recipe = recipe.with(r.effect(i, *effect, frame));
+            match effect {
+                Effect::Clump(k) => {
+                    reads.push(What::Clump(i, *k as u32));
+                    let areas = !r.project.groom.value.layer[i].clump[*k].areas.is_empty();
+                    reads.extend(frame.filter(|_| areas).map(What::Hits));
+                }
+                Effect::Wind if frame.is_some() => {
+                    recipe = recipe.param("time", r.project.seconds(frame), "the frame's time");
+                }
+                _ => {}
+            }
+        }
+        if !effects.is_empty() {
+            recipe = recipe.param("look", version::LOOK, "the look");
+        }
+        let collides = last && collides(r.project, i);
+        if collides {
+            let at = format!("layer[{i}].collision.clearance");
+            let clearance = r.project.groom.value.layer[i].collision.clearance;
+            recipe = r.unit(r.rest(recipe)).param("clearance", clearance, r.in_groom(&at));
+            recipe = recipe.param("collision", version::COLLISION, "collision");
+        }
+        if last && r.project.points(i) != r.project.base_points(i) {
+            let at = format!("layer[{i}].points");
+            recipe = recipe.param("finished points", r.project.points(i), r.in_groom(&at));
+        }
+        let carried = effects.iter().any(|e| e.has_axes(r.project, i));
+        if carried && frame.is_some() {
+            let rest = if r.project.target(i) == Target::EveryHair { What::Rest(i) } else { What::Comb };
+            reads.extend(Some(rest).filter(|w| !reads.contains(w)));
+        }
+        if (carried || collides) && !recipe.fields.iter().any(|f| f.name == "skin") {
+            recipe = r.skin(recipe, skin, frame.unwrap_or(0));
+        }
+        self.add(what, name, Stage::Interpolate, recipe, &reads);
+    }
+}
+
+/// A step that makes hairs.
+pub(super) struct Hairs<'a> {
+    pub what: What,
+    pub name: String,
+    /// What it reads apart from the look.
+    pub recipe: Recipe,
+    /// The look that acts in it.
+    pub effects: &'a [Effect],
+    /// True if its hairs are finished.
+    pub last: bool,
+    /// `None` for the rest pose.
+    pub frame: Option<i32>,
+    pub skin: &'a SkinAt,
+}
+
+impl Reader<'_> {
+    fn clump(&self, i: usize, k: usize) -> Recipe {
+        let layer = &self.project.groom.value.layer[i];
+        let c = &layer.clump[k];
+        let at = format!("layer[{i}].clump[{k}]");
+        let mut r = self.unit(Recipe::new("instance/clump", version::CLUMP));
+        r = r.param("seed", layer_seed(&layer.name), self.in_groom(&format!("layer[{i}].name")));
+        for v in c.making() {
+            r = r.with(self.value(v.name, &format!("{at}.{}", v.name), v.value, 0.0));
+        }
+        for (name, map) in [("area", &c.area), ("regions", &c.regions)] {
+            r = r.with(map.iter().flat_map(|m| self.map_at(name, &format!("{at}.{name}"), m)));
+        }
+        let by_hand = [("roots", c.roots.as_ref().map(|p| format!("{p:?}"))), ("curves", c.curves.as_ref().map(|p| format!("{p:?}")))];
+        for (name, value) in by_hand {
+            r = value.into_iter().fold(r, |r, v| r.param(name, v, self.in_groom(&format!("{at}.{name}"))));
+        }
+        if c.regions.is_some() && c.size.is_none() {
+            let density = format!("layer[{i}].density.value");
+            r = r.param("layer density", layer.density.value, self.in_groom(&density));
+        }
+        for (p, parting) in self.project.groom.value.parting.iter().enumerate() {
+            let key = format!("parting[{p}].points");
+            r = r.param(&format!("parting[{p}]"), format!("{:?}", parting.points), self.in_groom(&key));
+        }
+        r.param("of", if joins_clumps(c, k) { "clumps" } else { "hairs" }, self.in_groom(&format!("{at}.of")))
+    }
+
+    /// Fields of a parameter that varies over the skin, at a frame.
+    fn value(&self, name: &str, key: &str, v: &LookValue, frame: f64) -> Vec<Field> {
+        let at = self.in_groom(key);
+        let mut r = Recipe::new("", 0).param(name, v.at(frame), at.clone());
+        if v.0.noise != 0.0 {
+            r = r.param(&format!("{name}.noise"), v.0.noise, format!("{at}.noise"));
+        }
+        if !v.0.vary.is_empty() {
+            r = r.param(&format!("{name}.vary"), format!("{:?}", v.0.vary), format!("{at}.vary"));
+        }
+        r.with(v.map().iter().flat_map(|m| self.map_at(name, key, m))).fields
+    }
+
+    /// What one part of a layer's look reads at a frame, or at rest.
+    fn effect(&self, i: usize, effect: Effect, frame: Option<i32>) -> Vec<Field> {
+        let layer = &self.project.groom.value.layer[i];
+        let key = effect.key();
+        let at = format!("layer[{i}].{key}");
+        let seed = layer_seed(&layer.name);
+        let mut r = Recipe::new("", 0).param(&format!("{key}.seed"), seed, self.in_groom(&format!("layer[{i}].name")));
+        let moment = self.project.moment(frame);
+        for (_, v) in layer.varied().into_iter().filter(|(k, _)| *k == key) {
+            if matches!(v.name, "density" | "size") {
+                continue;
+            }
+            let fields = self.value(&format!("{key}.{}", v.name), &format!("{at}.{}", v.name), v.value, moment);
+            let own = if let Effect::Clump(k) = effect { overridden(self.project, i, k, &v) } else { None };
+            r = r.with(fields.into_iter().map(|f| match &own {
+                Some((shot, keyed)) if f.name == format!("{key}.{}", v.name) => {
+                    Field { value: keyed.at(moment).to_string(), label: self.in_shot(shot), ..f }
+                }
+                _ => f,
+            }));
+        }
+        for (name, value) in self.settings_of(i, effect) {
+            r = r.param(&format!("{key}.{name}"), value, self.in_groom(&format!("{at}.{name}")));
+        }
+        match effect {
+            Effect::Clump(k) if !layer.clump[k].areas.is_empty() => {
+                let named = |e: &&crate::config::Emitter| layer.clump[k].areas.contains(&e.name);
+                for e in self.project.groom.value.emitter.iter().filter(named) {
+                    let value = format!("{:?} {:?} {:?}", e.radius, e.percent, e.clump_rate);
+                    let label = self.in_groom(&format!("emitter ({}) radius, percent, clump_rate", e.name));
+                    r = r.param(&format!("{key}.area.{}", e.name), value, label);
+                }
+            }
+            Effect::Wave(k) => {
+                let map = layer.wave[k].map.as_ref();
+                r = r.with(map.iter().flat_map(|m| self.map_at(&format!("{key}.root"), &format!("{at}.map"), m)));
+            }
+            _ => {}
+        }
+        r.fields
+    }
+
+    /// What else a part of the look says, by key.
+    fn settings_of(&self, i: usize, effect: Effect) -> Vec<(&'static str, String)> {
+        let layer = &self.project.groom.value.layer[i];
+        match effect {
+            Effect::Clump(k) => {
+                let c = &layer.clump[k];
+                let mut out = vec![("taper", c.taper.to_string()), ("keep_length", c.keep_length.to_string())];
+                out.extend(c.dilation.iter().map(|d| ("dilation", format!("{d:?}"))));
+                out.extend(c.wet.iter().map(|w| ("wet", format!("{w:?}"))));
+                out
+            }
+            Effect::Curl => {
+                let c = layer.curl.as_ref().expect("the layer has curls");
+                let mut out = vec![
+                    ("kind", format!("{:?}", c.kind)),
+                    ("start", c.start.to_string()),
+                    ("keep_length", c.keep_length.to_string()),
+                    ("per_clump", c.per_clump.to_string()),
+                ];
+                out.extend(c.depth.iter().map(|d| ("depth", d.to_string())));
+                out.extend(c.profile.iter().map(|p| ("profile", format!("{p:?}"))));
+                out.extend(c.x.iter().map(|w| ("x", format!("{w:?}"))));
+                out.extend(c.y.iter().map(|w| ("y", format!("{w:?}"))));
+                out
+            }
+            Effect::Wave(k) => {
+                let w = &layer.wave[k];
+                vec![
+                    ("shape", format!("{:?}", w.shape)),
+                    ("x", format!("{:?}", w.x)),
+                    ("y", format!("{:?}", w.y)),
+                    ("size", w.size.to_string()),
+                    ("stray", w.stray.to_string()),
+                    ("keep_length", w.keep_length.to_string()),
+                ]
+            }
+            Effect::Noise(k) => {
+                let n = &layer.noise[k];
+                let mut out = vec![
+                    ("size", n.size.to_string()),
+                    ("across", n.across.to_string()),
+                    ("keep_length", n.keep_length.to_string()),
+                ];
+                out.extend(n.profile.iter().map(|p| ("profile", format!("{p:?}"))));
+                out
+            }
+            Effect::Wind => {
+                let w = layer.wind.as_ref().expect("the layer has wind");
+                vec![
+                    ("direction", format!("{:?}", w.direction)),
+                    ("frequency", w.frequency.to_string()),
+                    ("size", w.size.to_string()),
+                    ("gust", w.gust.to_string()),
+                ]
+            }
+        }
+    }
+
+    /// Particles of all emitters.
+    fn hits(&self) -> Recipe {
+        let shot = &self.project.shot.value.shot;
+        let mut r = Recipe::new("interpolate/areas", version::AREAS).param("fps", shot.fps, self.in_shot("shot.fps"));
+        for (k, e) in self.project.groom.value.emitter.iter().enumerate() {
+            let name = format!("emitter[{k}]");
+            let value = format!("{:?} {:?} {} {} {:?} {}", e.position, e.direction, e.spread, e.rate, e.frames, e.seed);
+            r = r.param(&name, value, self.in_groom(&name));
+            r = self.project.particles[k].iter().fold(r, |r, f| r.file(&format!("{name}.file"), &f.hash, f.label.clone()));
+        }
+        r.param("first", shot.frames[0], self.in_shot("shot.frames (first)"))
+    }
+}
+
+impl Step {
+    /// The look that acts in this step of a project, and true if its hairs are finished.
+    pub fn look(&self, project: &Project) -> (Vec<Effect>, bool) {
+        let i = self.what.layer().expect("hairs are of a layer");
+        let [simulated, after] = effects(project, i);
+        match self.what {
+            What::Rest(_) if project.target(i) == Target::EveryHair => (simulated, finished_rest(project, i) == self.what),
+            _ => (after, true),
+        }
+    }
+}
