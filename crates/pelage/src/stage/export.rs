@@ -148,19 +148,20 @@ pub fn write(run: &mut Runner<'_>, what: What, format: ExportFormat) -> Result<(
             let mut file = McapHair::create(&part, &facts, &hair_layers(run)?)?;
             frames(run, &facts, |frame, hair| Ok(file.write_frame(frame, hair)?))?;
             file.finish()?;
-            let points = {
+            let sizes = {
                 let layers = hair_layers(run)?;
                 mcap::verify_layers(&part, &facts, &layers)?;
-                layers.iter().map(|l| l.offsets.total()).collect::<Vec<_>>()
+                layers.iter().map(|l| [l.offsets.len(), l.offsets.total()]).collect::<Vec<_>>()
             };
-            mcap::verify_frames(&part, &facts, &points)?;
+            mcap::verify_frames(&part, &facts, &sizes)?;
         }
         ExportFormat::Ply => {
             let layers = hair_layers(run)?;
             frames(run, &facts, |frame, hair| {
                 let part = parts.add(&out, format!("hair.{frame:04}.ply"));
                 ply::write_hair(&part, &facts, &layers, hair)?;
-                verify_ply(&part, &layers, hair)
+                verify_ply(&part, &layers, hair)?;
+                Ok(ply::verify_hair(&part, &facts, &layers, hair)?)
             })?;
         }
     }
@@ -190,15 +191,18 @@ fn frames(
                 });
             }
         }
-        let hair: Vec<HairFrame<'_>> =
-            now.iter().zip(&velocity).map(|(position, velocity)| HairFrame { position, velocity }).collect();
+        let hair: Vec<HairFrame<'_>> = now
+            .iter()
+            .zip(&velocity)
+            .map(|(position, velocity)| HairFrame { position, velocity, ..HairFrame::default() })
+            .collect();
         write(frame, &hair)?;
         now = next.unwrap_or_default();
     }
     Ok(())
 }
 
-/// Reads a PLY file back: ids, counts and positions must be what was written.
+/// Reads a PLY file back as curves: ids, counts and positions must be what was written.
 fn verify_ply(path: &Path, layers: &[HairLayer], hair: &[HairFrame<'_>]) -> Result<(), Error> {
     let read = ply::read_curves(path)?.strands;
     let same = read.id.iter().eq(layers.iter().flat_map(|l| &l.id))
