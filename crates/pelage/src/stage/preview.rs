@@ -72,8 +72,11 @@ fn thinned(layer: HairLayer, every: usize) -> HairLayer {
     HairLayer {
         width: nth(&layer.width, &layer.offsets, every).map(|w| w * every as f32).collect(),
         offsets: Offsets::from_counts(layer.offsets.counts().step_by(every)),
-        opacity: layer.opacity.into_iter().step_by(every).collect(),
-        color: layer.color.into_iter().step_by(every).collect(),
+        opacity: layer.opacity.iter().copied().step_by(every).collect(),
+        color: match layer.color_per_point() {
+            true => nth(&layer.color, &layer.offsets, every).collect(),
+            false => layer.color.iter().copied().step_by(every).collect(),
+        },
         ..HairLayer::default()
     }
 }
