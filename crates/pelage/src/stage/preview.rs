@@ -177,3 +177,22 @@ fn save(run: &mut Runner<'_>, what: What, name: &str, picture: &Image) -> Result
     write_png(&part, picture.width, picture.height, &picture.to_srgb8())?;
     export::publish(run, what, vec![(part, name.to_owned())])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thinned_hair_keeps_its_colours_at_its_points() {
+        let offsets = Offsets::from_counts([2, 3, 4]);
+        let layer = HairLayer { width: vec![0.5; 9], opacity: vec![1.0, 0.5, 0.25], offsets, ..HairLayer::default() };
+        let hairs: Vec<[f32; 3]> = (0..3).map(|h| [h as f32; 3]).collect();
+        let points: Vec<[f32; 3]> = (0..9).map(|p| [p as f32; 3]).collect();
+        let of = |color: &[[f32; 3]]| thinned(HairLayer { color: color.to_vec(), ..layer.clone() }, 2);
+        assert_eq!(of(&hairs).color, [[0.0; 3], [2.0; 3]]);
+        let drawn = of(&points);
+        assert_eq!(drawn.color, [0.0f32, 1.0, 5.0, 6.0, 7.0, 8.0].map(|p| [p; 3]));
+        assert_eq!((drawn.offsets, drawn.width), (Offsets::from_counts([2, 4]), vec![1.0; 6]));
+        assert_eq!(drawn.opacity, [1.0, 0.25]);
+    }
+}
