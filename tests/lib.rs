@@ -162,8 +162,14 @@ pub fn exported_hairs(file: &Path) -> BTreeMap<(String, u64), ExportedHair> {
             for f in &frames {
                 shape.extend(bits(&f.position[points.clone()]).chain(bits(&f.velocity[points.clone()])));
             }
-            let mut look: Vec<u32> = layer.width[points].iter().map(|x| x.to_bits()).collect();
-            look.extend(bits([&layer.color[i]]).chain([layer.opacity[i].to_bits()]));
+            let mut look: Vec<u32> = layer.width[points.clone()].iter().map(|x| x.to_bits()).collect();
+            let colors = if layer.color_per_point() { points.clone() } else { i..i + 1 };
+            look.extend(bits(&layer.color[colors]).chain([layer.opacity[i].to_bits()]));
+            for f in &frames {
+                look.extend(
+                    f.width.get(points.clone()).into_iter().flatten().chain(f.opacity.get(i)).map(|x| x.to_bits()),
+                );
+            }
             let hair = ExportedHair { root: (layer.skin_face[i], layer.root_uv[i].map(f32::to_bits)), shape, look };
             assert!(hairs.insert((name.clone(), *id), hair).is_none(), "hair {id} of {name} is there twice");
         }

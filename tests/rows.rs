@@ -198,6 +198,86 @@ fn width_opacity_and_colour_interpolate_nothing() {
 }
 
 #[test]
+fn profiles_and_ramps_only_write_files() {
+    let shot = finished();
+    let before = hairs(&shot);
+    shot.edit(GROOM, "tip = 0.5", "profile = [1.0, 1.25, 0.5]");
+    let why = ["grooms/ball.toml: layer[0].width.profile added", "grooms/ball.toml: layer[0].width.tip taken out"];
+    expect(&shot, FILES, &why);
+    shot.edit(GROOM, "1.25, 0.5]", "1.25, 0.75]");
+    let why = ["grooms/ball.toml: layer[0].width.profile [1.0, 1.25, 0.5] -> [1.0, 1.25, 0.75]"];
+    expect(&shot, FILES, &why);
+    shot.edit(GROOM, "[0.4, 0.2, 0.1]", "[0.4, 0.2, 0.1], noise = 0.0, ramp = [[1, 1, 1], [0.5, 0.5, 2]]");
+    expect(&shot, FILES, &["grooms/ball.toml: layer[1].color.ramp added"]);
+    shot.edit(GROOM, "[0.5, 0.5, 2]]", "[0.5, 0.5, 1]]");
+    let why = [
+        "grooms/ball.toml: layer[1].color.ramp [[1.0, 1.0, 1.0], [0.5, 0.5, 2.0]] -> [[1.0, 1.0, 1.0], [0.5, 0.5, 1.0]]",
+    ];
+    expect(&shot, FILES, &why);
+    // Six points a hair: diameters on the profile, colours of the other layer on the ramp, all else as it was.
+    for (key, hair) in &hairs(&shot) {
+        let (old, look) = (&before[key].look, |k: usize| f32::from_bits(hair.look[k]));
+        assert_eq!((&hair.root, &hair.shape), (&before[key].root, &before[key].shape));
+        if key.0 == "under" {
+            for (k, factor) in [1.0, 1.1, 1.2, 1.15, 0.95, 0.75].into_iter().enumerate() {
+                assert!((look(k) / (40e-4 * factor) - 1.0).abs() < 1e-5, "{key:?}: {} at point {k}", look(k));
+            }
+            assert_eq!(hair.look[6..], old[6..]);
+        } else {
+            assert_eq!((&hair.look[..6], hair.look.len()), (&old[..6], 6 + 3 * 6 + 1));
+            for k in 0..6 {
+                let shade = 1.0 - 0.1 * k as f32;
+                let wanted = [0.4 * shade, 0.2 * shade, 0.1];
+                assert!((0..3).all(|x| (look(6 + 3 * k + x) - wanted[x]).abs() < 1e-6), "{key:?}: point {k}");
+            }
+        }
+    }
+}
+
+#[test]
+fn guard_hairs_are_two_columns() {
+    let shot = finished();
+    let before = hairs(&shot);
+    let length = with_files(&["instance/length/over", "instance/width/over", "interpolate/over/*"]);
+    shot.edit(GROOM, "name = \"over\"", "name = \"over\"\nguard = { percent = 0.1 }");
+    let why = ["percent", "length", "width"].map(|k| format!("grooms/ball.toml: layer[1].guard.{k} added"));
+    expect(&shot, &length, &why.each_ref().map(String::as_str));
+    shot.edit(GROOM, "percent = 0.1", "percent = 0.1, width = 2.0");
+    expect(&shot, &with_files(&["instance/width/over"]), &["grooms/ball.toml: layer[1].guard.width 1.6 -> 2"]);
+    let few = hairs(&shot);
+    shot.edit(GROOM, "percent = 0.1", "percent = 0.3");
+    expect(&shot, &length, &["grooms/ball.toml: layer[1].guard.percent 0.1 -> 0.3"]);
+    let many = hairs(&shot);
+    // Their rest points, after two weights on the skin.
+    let long = |hair: &ExportedHair| {
+        let p: Vec<[f32; 3]> = hair.shape[2..20].chunks(3).map(|p| [0, 1, 2].map(|x| f32::from_bits(p[x]))).collect();
+        p.windows(2).map(|w| (0..3).map(|x| f64::from(w[1][x] - w[0][x]).powi(2)).sum::<f64>().sqrt()).sum::<f64>()
+    };
+    let is_guard = |hair: &ExportedHair, old: &ExportedHair| {
+        let guard = hair.look[0] != old.look[0];
+        let (wide, longer) = if guard { (2.0, 1.5) } else { (1.0, 1.0) };
+        assert_eq!(f32::from_bits(hair.look[0]), wide * f32::from_bits(old.look[0]));
+        assert!((long(hair) / long(old) - longer).abs() < 1e-5, "{} instead of {}", long(hair), long(old));
+        guard
+    };
+    let mut found = [0; 3];
+    for (key, old) in &before {
+        if key.0 == "under" {
+            assert!(many[key] == *old);
+            continue;
+        }
+        let (a, b) = (is_guard(&few[key], old), is_guard(&many[key], old));
+        assert!(b || !a, "hair {key:?} is no guard hair any more");
+        found = [found[0] + 1, found[1] + usize::from(a), found[2] + usize::from(b)];
+    }
+    let [n, a, b] = found.map(|n| n as f64);
+    assert!(
+        (a / n - 0.1).abs() < 5.0 * (0.09 / n).sqrt() && (b / n - 0.3).abs() < 5.0 * (0.21 / n).sqrt(),
+        "{found:?}"
+    );
+}
+
+#[test]
 fn a_comb_operation() {
     let shot = finished();
     let names = with_files(&["groom/comb", "interpolate/under/*", "interpolate/over/*"]);

@@ -199,6 +199,56 @@ fn targets_give_the_points_that_they_should() {
     assert_eq!(points(&hairs(&shot), "under"), [6]);
 }
 
+/// One layer moves hair by hair, the other rides the skin, in one run; neither's look is the other's matter.
+#[test]
+fn layers_have_targets_of_their_own() {
+    let shot = simulated_shot(COMMAND, 6);
+    shot.edit(GROOM, "name = \"over\"", "name = \"over\"\nsimulate = \"off\"");
+    let report = shot.report(&[]);
+    let all = hairs(&shot);
+    let under = all.keys().filter(|k| k.0 == "under").count();
+    assert!(under > 50 && all.len() > under + 50);
+    let counts = &stage(&report, "simulate")["counts"];
+    assert_eq!((&counts["simulated"], &counts["particles"]), (&under.into(), &(9 * under).into()));
+    let only = |steps: &[&str]| {
+        let (run, _) = shot.plan(&[]);
+        let files = ["export/usd", "export/mcap", "preview/still"];
+        let stray: Vec<&String> =
+            run.iter().filter(|s| !files.contains(&s.as_str()) && !steps.iter().any(|w| s.starts_with(w))).collect();
+        assert!(stray.is_empty() && steps.iter().all(|w| run.iter().any(|s| s.starts_with(w))), "{run:?}");
+    };
+    // Looks of the simulated layer: no layer moves anew, and of the other layer nothing is read again.
+    shot.edit(GROOM, "width = { value = 40.0, tip = 0.5 }", "width = { value = 55.0, profile = [1, 0.5, 0.1] }");
+    shot.edit(GROOM, "[[layer]]", "[[layer]]\ncolor = { value = [0.2, 0.3, 0.1], ramp = [[1, 1, 1], [2, 2, 1]] }");
+    only(&["instance/width/under", "instance/color/under"]);
+    let why = [
+        "width.value 40 -> 55",
+        "width.profile added",
+        "width.tip taken out",
+        "color.value [0.15, 0.08, 0.04] -> [0.2, 0.3, 0.1]",
+        "color.noise 0.1 -> 0",
+        "color.ramp added",
+    ]
+    .map(|w| format!("grooms/ball.toml: layer[0].{w}"));
+    expect(&shot, &[], &why.each_ref().map(String::as_str), 0);
+    // The length of the layer that rides.
+    shot.edit(GROOM, "length = { value = 2.5,", "length = { value = 2.5, noise = 0.1,");
+    only(&["instance/length/over", "interpolate/over/"]);
+    expect(&shot, &[], &["grooms/ball.toml: layer[1].length.noise 0 -> 0.1"], 0);
+    let after = hairs(&shot);
+    for (key, hair) in &all {
+        assert_eq!(hair.shape == after[key].shape, key.0 == "under", "{key:?}");
+        assert_eq!(hair.look == after[key].look, key.0 == "over", "{key:?}");
+    }
+    // Guard hairs are longer: where they are simulated, so are they anew.
+    shot.edit(GROOM, "[[layer]]", "[[layer]]\nguard = { percent = 0.2, length = 1.3, width = 1 }");
+    only(&["instance/length/under", "instance/width/under", "simulate/under/", "interpolate/under/"]);
+    let why = ["percent", "length", "width"].map(|k| format!("grooms/ball.toml: layer[0].guard.{k} added"));
+    expect(&shot, &UNDER, &why.each_ref().map(String::as_str), 6);
+    shot.edit(GROOM, "width = 1 }", "width = 2 }");
+    expect(&shot, &[], &["grooms/ball.toml: layer[0].guard.width 1 -> 2"], 0);
+}
+
 /// Without gravity, and before anything but the skin moves them, hairs start where the groom has them.
 #[test]
 fn frames_before_the_first_come_from_the_sequence() {

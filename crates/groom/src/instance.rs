@@ -172,6 +172,19 @@ pub fn colour_column(
     })
 }
 
+/// Whether a hair is a guard hair: one of a `share` (0 to 1) of its layer, drawn by its id, longer and thicker than the
+/// rest (paper §3.4, footnote 7). A larger share has the same guard hairs and others.
+pub fn is_guard(id: StrandId, share: f64, seed: u64) -> bool {
+    rng::uniform(seed, id, rng::channel("guard"), 0) < share
+}
+
+/// Multiplies the values of guard hairs (see [`is_guard`]) by `factor`; leaves the others as they are. \[N\] values of
+/// the hairs of `roots`.
+pub fn scale_guards(values: &mut [f32], roots: &Roots, share: f64, factor: f32, seed: u64) {
+    let hairs = values.par_iter_mut().zip(&roots.id).with_min_len(CHUNK);
+    hairs.filter(|(_, id)| is_guard(**id, share, seed)).for_each(|(value, _)| *value *= factor);
+}
+
 /// 1 - noise to 1 + noise.
 fn vary(seed: u64, id: StrandId, channel: u64, noise: f32) -> f32 {
     if noise == 0.0 {

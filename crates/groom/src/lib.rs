@@ -1,5 +1,6 @@
 //! Hair without time: control hairs placed and combed, hairs instanced from maps, weights, interpolation.
 
+pub mod along;
 mod area_curve;
 mod box_tree;
 pub mod candidates;

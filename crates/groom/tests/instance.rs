@@ -3,7 +3,7 @@
 use pelage_geom::{Map, Mesh, SurfacePoint, TiledMap, Topology, Vec3, Wrap, rng};
 use pelage_groom::candidates::{Candidates, candidates, strand_id};
 use pelage_groom::control::Sites;
-use pelage_groom::instance::{Density, Feature, colour_column, feature_column, roots, weights};
+use pelage_groom::instance::{Density, Feature, colour_column, feature_column, is_guard, roots, scale_guards, weights};
 use pelage_groom::triangulate::triangulate;
 
 /// A grid of n x n cells over [0, 1]^2, bent by `shape`, with texture coordinates from `uv`.
@@ -296,6 +296,40 @@ fn features_follow_value_map_and_noise() {
 }
 
 #[test]
+fn guard_hairs_are_a_share_of_all_and_more_share_only_adds() {
+    let mesh = flat(2);
+    let topology = Topology::new(&mesh);
+    let r = roots(&mesh, &topology, &all(&mesh, 20_000), &Density { value: 20_000.0, ..Density::default() }, 2);
+    let n = r.id.len();
+    let plain = feature_column(&r, &Feature { value: 4.0, noise: 0.3, channel: 9, ..Feature::default() }, 1);
+    let mut before = vec![false; n];
+    for share in [0.0, 0.02, 0.1, 0.5, 1.0] {
+        let guard: Vec<bool> = r.id.iter().map(|id| is_guard(*id, share, 1)).collect();
+        assert!(before.iter().zip(&guard).all(|(b, g)| !b || *g), "a share of {share} lost a guard hair");
+        // Binomial: five standard deviations.
+        let found = guard.iter().filter(|g| **g).count() as f64;
+        assert!(
+            (found - share * n as f64).abs() <= 5.0 * (share * (1.0 - share) * n as f64).sqrt(),
+            "{share}: {found}"
+        );
+        let mut longer = plain.clone();
+        scale_guards(&mut longer, &r, share, 1.5, 1);
+        for k in 0..n {
+            assert_eq!(longer[k], if guard[k] { plain[k] * 1.5 } else { plain[k] });
+        }
+        before = guard;
+    }
+    // Other seeds draw other hairs, and they are spread over the skin: every quarter has its share.
+    assert!((0..n).any(|k| is_guard(r.id[k], 0.1, 1) != is_guard(r.id[k], 0.1, 7)));
+    for quarter in 0..4 {
+        let here: Vec<usize> =
+            (0..n).filter(|&k| usize::from(r.uv[k][0] > 0.5) + 2 * usize::from(r.uv[k][1] > 0.5) == quarter).collect();
+        let found = here.iter().filter(|&&k| is_guard(r.id[k], 0.1, 1)).count() as f64;
+        assert!((found / here.len() as f64 - 0.1).abs() < 0.025, "{found} of {}", here.len());
+    }
+}
+
+#[test]
 fn results_do_not_depend_on_threads() {
     let mesh = two_charts();
     let topology = Topology::new(&mesh);
@@ -313,7 +347,9 @@ fn results_do_not_depend_on_threads() {
             let t = triangulate(&sites, &[false, false]);
             let w = weights(&r, &t);
             let f = Feature { value: 1.0, map: Some(&image), noise: 0.3, channel: 4 };
-            (feature_column(&r, &f, 3), t, w, r)
+            let mut column = feature_column(&r, &f, 3);
+            scale_guards(&mut column, &r, 0.2, 1.5, 3);
+            (column, t, w, r)
         })
     };
     let one = run(1);

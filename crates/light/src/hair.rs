@@ -74,6 +74,7 @@ struct Knot {
     /// Direction of the curve: derivative by length.
     m: V3,
     width: f32,
+    color: V3,
     /// Pixels per scene unit.
     scale: f32,
 }
@@ -107,7 +108,8 @@ impl Draw<'_> {
                     break;
                 }
                 let scale = self.view.scale(p.z.max(self.view.near)) as f32;
-                let knot = Knot { p: p.cast(), m: V3::zeros(), width: layer.width(i), scale };
+                let color = layer.color(s, i);
+                let knot = Knot { p: p.cast(), m: V3::zeros(), width: layer.width(i), color, scale };
                 let end = i + 1 == last;
                 let close = scratch.knot.last().is_some_and(|k| (knot.p - k.p).norm() * scale < MERGE);
                 if !close || end {
@@ -138,7 +140,7 @@ impl Draw<'_> {
         for k in knot.iter() {
             self.lighting.depths(k.p, V3::zeros(), &mut scratch.depth);
         }
-        let (color, opacity) = (layer.color(s), layer.opacity(s));
+        let opacity = layer.opacity(s);
         if opacity <= 0.0 {
             return;
         }
@@ -156,6 +158,7 @@ impl Draw<'_> {
                     let (d0, d1) = (scratch.depth[k * lights + l], scratch.depth[(k + 1) * lights + l]);
                     *d = d0 + (d1 - d0) * u;
                 }
+                let color = a.color + (b.color - a.color) * u;
                 let rgb = self.lighting.hair(p, t, color, normal, &depth);
                 let point =
                     Point { width: a.width + (b.width - a.width) * u, rgb: rgb.into(), strand, ..Point::default() };

@@ -37,7 +37,7 @@ pub struct HairView<'a> {
     pub origin: [f64; 3],
     /// Diameter, scene units, one a point (default 0: not seen).
     pub width: &'a [f32],
-    /// Linear colour, one a strand (default a middle brown).
+    /// Linear colour, one a strand or one a point, interpolated along the hair (default a middle brown).
     pub color: &'a [[f32; 3]],
     /// Opacity of a hair's whole width, one a strand, in [0, 1] (default 1).
     pub opacity: &'a [f32],
@@ -115,8 +115,11 @@ impl HairView<'_> {
         self.width.get(i).copied().filter(|w| *w > 0.0 && *w < 1e15).unwrap_or(0.0)
     }
 
-    pub(crate) fn color(&self, s: usize) -> V3 {
-        V3::from(self.color.get(s).copied().unwrap_or(BROWN)).map(|c| c.clamp(0.0, 1.0)).map(not_nan)
+    /// Colour of strand `s` at its point `i` (counted over all strands). A strand has two points or more: more colours
+    /// than strands are one a point.
+    pub(crate) fn color(&self, s: usize, i: usize) -> V3 {
+        let entry = if self.color.len() > self.offsets.len() { i } else { s };
+        V3::from(self.color.get(entry).copied().unwrap_or(BROWN)).map(|c| c.clamp(0.0, 1.0)).map(not_nan)
     }
 
     pub(crate) fn opacity(&self, s: usize) -> f32 {

@@ -310,6 +310,31 @@ fn nothing_to_draw_is_background() {
 }
 
 #[test]
+fn colours_of_points_run_along_the_hair() {
+    // The same colour at every point is the colour of the hair, bit by bit.
+    let one = tuft(60);
+    let mut each = one.clone();
+    each.color = one.counts.iter().zip(&one.color).flat_map(|(n, c)| std::iter::repeat_n(*c, *n)).collect();
+    let lights = [Light { direction: [0.3, -1.0, -0.5], color: [2.0; 3] }];
+    let picture = |h: &Hairs| h.render(None, &lights, [0.0; 3], &Settings::default());
+    assert_eq!(picture(&one).rgb, picture(&each).rgb);
+    // Of a straight hair with colours at its points, a pixel has what lies between its neighbours.
+    let mut hair = Hairs::default();
+    hair.add(&[[-60.0, 0.5, 0.0], [-20.0, 0.5, 0.0], [60.0, 0.5, 0.0]], 4.0, [0.0; 3], 1.0);
+    hair.color = vec![[0.0, 1.0, 0.25], [1.0, 0.5, 0.25], [0.25, 0.0, 0.25]];
+    let image = hair.render(None, &[], [0.0; 3], &even());
+    for x in (25..135).step_by(5) {
+        let at = x as f32 + 0.5 - 80.0;
+        let expected = match at {
+            a if a < -20.0 => [(a + 60.0) / 40.0, 1.0 - 0.5 * (a + 60.0) / 40.0, 0.25],
+            a => [1.0 - 0.75 * (a + 20.0) / 80.0, 0.5 - 0.5 * (a + 20.0) / 80.0, 0.25],
+        };
+        let found = image.rgb[64 * 160 + x];
+        assert!((0..3).all(|k| (found[k] - expected[k]).abs() < 0.01), "pixel {x}: {found:?}, not {expected:?}");
+    }
+}
+
+#[test]
 fn bad_input_is_counted_and_passed_over() {
     let offsets = Offsets::from_counts([4, 1, 0, 3, 5]);
     let mut position: Vec<[f32; 3]> = (0..13).map(|i| [i as f32, 0.3 * i as f32, 0.0]).collect();

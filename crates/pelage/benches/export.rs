@@ -19,7 +19,7 @@ fn main() {
     let (facts, layer) = shot(curves, points, frames);
     let layers = [layer];
     let (position, velocity) = frame(&layers[0], 0.0);
-    let data = [HairFrame { position: &position, velocity: &velocity }];
+    let data = [HairFrame { position: &position, velocity: &velocity, ..HairFrame::default() }];
     let bytes = frames * 2 * size_of_val(position.as_slice());
     println!("{curves} curves x {points} points x {frames} frames: {:.1} MB of points and velocities", mb(bytes));
 
@@ -52,10 +52,10 @@ fn main() {
     let path = folder.join("hair.usdc");
     report("usdc verify", bytes, || usd::verify(&path, &facts, &layers).expect("the file just written"));
     let path = folder.join("hair.mcap");
-    let points: Vec<usize> = layers.iter().map(|l| l.offsets.total()).collect();
+    let sizes: Vec<[usize; 2]> = layers.iter().map(|l| [l.offsets.len(), l.offsets.total()]).collect();
     report("mcap verify", bytes, || {
         mcap::verify_layers(&path, &facts, &layers).expect("the file just written");
-        mcap::verify_frames(&path, &facts, &points).expect("the file just written");
+        mcap::verify_frames(&path, &facts, &sizes).expect("the file just written");
     });
     for name in ["plain.bin", "hair.usdc", "hair.mcap"] {
         std::fs::remove_file(folder.join(name)).expect("the file just written");

@@ -106,7 +106,8 @@ fn read_mcap(path: &Path, frame: Option<f64>) -> Result<CurveFile, FormatError> 
             root_uv: fixed.root_uv,
             id: fixed.id,
         };
-        layers.push(CurveSet { name, strands, width: fixed.width });
+        let width = if now.width.is_empty() { fixed.width } else { now.width };
+        layers.push(CurveSet { name, strands, width });
     }
     Ok(CurveFile {
         format: "MCAP",

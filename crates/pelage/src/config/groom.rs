@@ -240,9 +240,11 @@ pub struct Feature {
 pub struct WidthFeature {
     /// Diameter at the root, micrometres, where the map is 1.
     pub value: f64,
-    /// Diameter at the tip as a share of the root's. Default: 0.3.
-    #[serde(default = "tip")]
-    pub tip: f64,
+    /// Diameter at the tip as a share of the root's, straight from root to tip. Default: 0.3.
+    pub tip: Option<f64>,
+    /// Instead of `tip`: shares of the diameter at 2 to 16 stations at equal distances from root to tip, straight between
+    /// them.
+    pub profile: Option<Vec<f64>>,
     /// Image that multiplies the value; `<UDIM>` stands for the tile number.
     pub map: Option<PathBuf>,
     /// Channel of the map. Default: the grey value.
@@ -256,11 +258,20 @@ pub struct WidthFeature {
     pub noise: f64,
 }
 
-fn tip() -> f64 {
-    0.3
-}
-
 impl WidthFeature {
+    /// Diameter at the tip as a share of the root's, where no profile is given.
+    pub fn tip(&self) -> f64 {
+        self.tip.unwrap_or(0.3)
+    }
+
+    /// Shares of the diameter at stations at equal distances from root to tip.
+    pub fn stations(&self) -> Vec<f32> {
+        match &self.profile {
+            Some(profile) => profile.iter().map(|x| *x as f32).collect(),
+            None => vec![1.0, self.tip() as f32],
+        }
+    }
+
     /// The part that every feature has.
     pub fn feature(&self) -> Feature {
         let WidthFeature { value, map, channel, wrap, noise, .. } = self.clone();
@@ -283,6 +294,39 @@ pub struct ColorFeature {
     /// Random variation of brightness per hair. Default: 0.
     #[serde(default)]
     pub noise: f64,
+    /// Factors for red, green and blue at 2 to 16 stations at equal distances from root to tip, straight between them; they
+    /// multiply value and map. Default: the same colour from root to tip.
+    #[serde(default, deserialize_with = "some_points")]
+    pub ramp: Option<Vec<[f64; 3]>>,
+}
+
+impl ColorFeature {
+    /// Factors at stations at equal distances from root to tip, if there is a ramp.
+    pub fn stations(&self) -> Option<Vec<[f32; 3]>> {
+        self.ramp.as_ref().map(|ramp| ramp.iter().map(|c| c.map(|x| x as f32)).collect())
+    }
+}
+
+/// Guard hairs: some of a layer's hairs are longer and thicker than the rest.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Guard {
+    /// Share of the layer's hairs that are guard hairs, 0 to 1. More keeps those that were.
+    pub percent: f64,
+    /// Factor on their length. Default: 1.5.
+    #[serde(default = "longer")]
+    pub length: f64,
+    /// Factor on their render width. Default: 1.6.
+    #[serde(default = "thicker")]
+    pub width: f64,
+}
+
+fn longer() -> f64 {
+    1.5
+}
+
+fn thicker() -> f64 {
+    1.6
 }
 
 /// A layer of hair.
@@ -306,6 +350,8 @@ pub struct Layer {
     /// Colour. Default: brown.
     #[serde(default = "default_color")]
     pub color: ColorFeature,
+    /// Some hairs are longer and thicker. Default: none.
+    pub guard: Option<Guard>,
     /// Points of a finished hair, the root included. Default: as many as the control hairs have; for hairs simulated one by
     /// one, `simulate.segments` + 1. More of them are laid on a smooth curve.
     pub points: Option<usize>,
@@ -336,7 +382,7 @@ pub struct Layer {
 
 fn default_width() -> WidthFeature {
     let Feature { value, map, channel, wrap, noise } = constant(80.0);
-    WidthFeature { value, tip: tip(), map, channel, wrap, noise }
+    WidthFeature { value, tip: None, profile: None, map, channel, wrap, noise }
 }
 
 fn default_opacity() -> Feature {
@@ -344,7 +390,7 @@ fn default_opacity() -> Feature {
 }
 
 fn default_color() -> ColorFeature {
-    ColorFeature { value: [0.15, 0.08, 0.04], map: None, wrap: WrapMode::Clamp, noise: 0.1 }
+    ColorFeature { value: [0.15, 0.08, 0.04], map: None, wrap: WrapMode::Clamp, noise: 0.1, ramp: None }
 }
 
 fn constant(value: f64) -> Feature {
@@ -414,15 +460,49 @@ impl Document<GroomFile> {
         self.feature(&format!("{key}.density"), &l.density, 1e5)?;
         self.feature(&format!("{key}.length"), &l.length, 1e6)?;
         self.feature(&format!("{key}.width"), &l.width.feature(), 1e6)?;
-        self.within(&format!("{key}.width.tip"), l.width.tip, 0.0, 10.0)?;
+        self.check_width(&format!("{key}.width"), &l.width)?;
         self.feature(&format!("{key}.opacity"), &l.opacity, 1.0)?;
         for (i, x) in l.color.value.iter().enumerate() {
             self.within(&format!("{key}.color.value[{i}]"), *x, 0.0, 1e3)?;
         }
         self.within(&format!("{key}.color.noise"), l.color.noise, 0.0, 1.0)?;
+        if let Some(ramp) = &l.color.ramp {
+            self.stations(&format!("{key}.color.ramp"), ramp.len())?;
+            for (i, x) in ramp.iter().enumerate().flat_map(|(i, c)| c.iter().map(move |x| (i, *x))) {
+                self.within(&format!("{key}.color.ramp[{i}]"), x, 0.0, 1e3)?;
+            }
+        }
+        if let Some(g) = &l.guard {
+            for (name, x, most) in [("percent", g.percent, 1.0), ("length", g.length, 1e3), ("width", g.width, 1e3)] {
+                self.within(&format!("{key}.guard.{name}"), x, 0.0, most)?;
+            }
+        }
         check_material(self, &format!("{key}.material"), &l.material)?;
         self.check_look(key, l)?;
         self.points(&format!("{key}.points"), l.points)
+    }
+
+    fn check_width(&self, key: &str, w: &WidthFeature) -> Result<(), ConfigError> {
+        self.within(&format!("{key}.tip"), w.tip(), 0.0, 10.0)?;
+        let Some(profile) = &w.profile else { return Ok(()) };
+        let key = format!("{key}.profile");
+        if w.tip.is_some() {
+            return Err(self.error(&key, "says what `tip` says too", "take out one of the two"));
+        }
+        self.stations(&key, profile.len())?;
+        profile.iter().enumerate().try_for_each(|(i, x)| self.within(&format!("{key}[{i}]"), *x, 0.0, 10.0))
+    }
+
+    /// Stations from root to tip.
+    fn stations(&self, key: &str, count: usize) -> Result<(), ConfigError> {
+        if (2..=16).contains(&count) {
+            return Ok(());
+        }
+        Err(self.error(
+            key,
+            format!("has {count} stations"),
+            "give 2 to 16, the first for the root, the last for the tip",
+        ))
     }
 
     /// Keys that belong to another kind are refused: nobody should tune a value that nothing reads.

@@ -63,10 +63,15 @@ impl ShotCheck {
         let mut bounds = Vec::with_capacity(layers.len());
         for (shape, data) in self.layers.iter().zip(layers) {
             let points = shape.offsets.total();
-            for (what, values) in [("positions", data.position), ("velocities", data.velocity)] {
-                if values.len() != points {
-                    let count = values.len();
-                    return Err(bad(format!("layer {:?} has {count} {what}, expected {points}", shape.name)));
+            let sizes = [
+                ("positions", data.position.len(), points, false),
+                ("velocities", data.velocity.len(), points, false),
+                ("widths", data.width.len(), points, true),
+                ("opacities", data.opacity.len(), shape.offsets.len(), true),
+            ];
+            for (what, count, expected, may_be_empty) in sizes {
+                if count != expected && !(may_be_empty && count == 0) {
+                    return Err(bad(format!("layer {:?} has {count} {what}, expected {expected}", shape.name)));
                 }
             }
             let scan = |what: &str, values: &[[f32; 3]]| match Bounds::of(values) {
@@ -74,6 +79,14 @@ impl ShotCheck {
                 None => Err(bad(not_finite(shape, what, values))),
             };
             scan("velocity", data.velocity)?;
+            if let Some(i) = data.width.iter().position(|w| !is_width(*w)) {
+                let hair = shape.id[curve_of(&shape.offsets, i)];
+                return Err(bad(format!("layer {:?}, hair {hair}: a width is {}", shape.name, data.width[i])));
+            }
+            if let Some(i) = data.opacity.iter().position(|x| !x.is_finite()) {
+                let hair = shape.id[i];
+                return Err(bad(format!("layer {:?}, hair {hair}: the opacity is {}", shape.name, data.opacity[i])));
+            }
             bounds.push(scan("position", data.position)?);
         }
         self.written += 1;
@@ -91,6 +104,11 @@ impl ShotCheck {
             .at(format!("frame {next}"))),
         }
     }
+}
+
+/// A diameter that renderers take: finite and not negative.
+pub(super) fn is_width(w: f32) -> bool {
+    w.is_finite() && w >= 0.0
 }
 
 /// Names the hair and the point of the first value that is not a number.
@@ -141,7 +159,7 @@ fn check_layer(path: &Path, layer: &HairLayer) -> Result<(), FormatError> {
         ("root texture coordinates", layer.root_uv.len(), curves, false),
         ("skin faces", layer.skin_face.len(), curves, true),
         ("skin weights", layer.skin_bary.len(), curves, true),
-        ("colours", layer.color.len(), curves, false),
+        ("colours", layer.color.len(), if layer.color.len() == points { points } else { curves }, false),
         ("opacities", layer.opacity.len(), curves, false),
         ("rest points", layer.rest.len(), points, false),
         ("widths", layer.width.len(), points, false),
@@ -169,7 +187,6 @@ fn check_layer(path: &Path, layer: &HairLayer) -> Result<(), FormatError> {
     let per_curve = [
         ("root texture coordinate", bytemuck::cast_slice::<_, f32>(&layer.root_uv), 2),
         ("skin weight", bytemuck::cast_slice(&layer.skin_bary), 2),
-        ("colour", bytemuck::cast_slice(&layer.color), 3),
         ("opacity", &layer.opacity, 1),
     ];
     for (what, values, width) in per_curve {
@@ -177,11 +194,15 @@ fn check_layer(path: &Path, layer: &HairLayer) -> Result<(), FormatError> {
             return bad(format!("hair {}: the {what} is {}", layer.id[i / width], values[i]));
         }
     }
+    if let Some(i) = layer.color.iter().position(|c| c.iter().any(|x| !x.is_finite())) {
+        let hair = if layer.color_per_point() { curve_of(&layer.offsets, i) } else { i };
+        return bad(format!("hair {}: a colour is {:?}", layer.id[hair], layer.color[i]));
+    }
     if let Some(i) = layer.rest.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
         let hair = curve_of(&layer.offsets, i);
         return bad(format!("hair {}: a point of the rest pose is {:?}", layer.id[hair], layer.rest[i]));
     }
-    match layer.width.iter().position(|w| !(w.is_finite() && *w >= 0.0)) {
+    match layer.width.iter().position(|w| !is_width(*w)) {
         Some(i) => bad(format!("hair {}: a width is {}", layer.id[curve_of(&layer.offsets, i)], layer.width[i])),
         None => Ok(()),
     }
@@ -267,6 +288,20 @@ pub(super) mod samples {
         (facts, vec![layer("over coat", &[4, 2, 5], true), layer("2nd", &[3, 3, 3, 3, 7], false)])
     }
 
+    /// The shot with a colour for each point of its first layer.
+    pub(crate) fn coloured() -> (ShotFacts, Vec<HairLayer>) {
+        let (facts, mut layers) = shot();
+        layers[0].color = layers[0].rest.iter().map(|p| p.map(|x| 0.5 + 0.5 * x)).collect();
+        (facts, layers)
+    }
+
+    /// Diameters and opacities of `layer` at `frame`, other than the layer's.
+    pub(crate) fn look(layer: &HairLayer, frame: i32) -> (Vec<f32>, Vec<f32>) {
+        let t = (frame - 1000) as f32;
+        let width = layer.width.iter().map(|w| w * (1.0 + 0.25 * t)).collect();
+        (width, layer.opacity.iter().map(|o| o * (1.0 - 0.125 * t)).collect())
+    }
+
     /// Positions and velocities of `layer` at `frame`.
     pub(crate) fn frame(layer: &HairLayer, frame: i32) -> (Vec<[f32; 3]>, Vec<[f32; 3]>) {
         let t = (frame - 1000) as f32 * 0.1;
@@ -334,9 +369,43 @@ mod tests {
         let (p0, v0) = samples::frame(&layers[0], 1001);
         let (mut p1, v1) = samples::frame(&layers[1], 1001);
         p1[7][2] = f32::NAN;
-        let frames = [HairFrame { position: &p0, velocity: &v0 }, HairFrame { position: &p1, velocity: &v1 }];
+        let of = |position, velocity| HairFrame { position, velocity, ..HairFrame::default() };
+        let frames = [of(&p0, &v0), of(&p1, &v1)];
         let error = check.frame(1001, &frames).unwrap_err().to_string();
         assert!(error.contains(&format!("hair {}: position of point 1", layers[1].id[2])), "{error}");
         assert!(check.finish().is_err());
+    }
+
+    #[test]
+    fn columns_of_a_frame_are_of_the_right_size_and_sound() {
+        let (facts, layers) = samples::shot();
+        let fresh = || ShotCheck::new(Path::new("x"), &facts, &layers).unwrap();
+        let data: Vec<_> = layers.iter().map(|l| (samples::frame(l, 1001), samples::look(l, 1001))).collect();
+        let of = |k: usize| {
+            let ((position, velocity), (width, opacity)) = &data[k];
+            HairFrame { position, velocity, width, opacity }
+        };
+        fresh().frame(1001, &[of(0), of(1)]).unwrap();
+        let error = |f: HairFrame| fresh().frame(1001, &[of(0), f]).unwrap_err().to_string();
+        assert!(error(HairFrame { width: &[0.1; 4], ..of(1) }).contains("has 4 widths, expected 19"));
+        assert!(error(HairFrame { opacity: &[0.1; 19], ..of(1) }).contains("has 19 opacities, expected 5"));
+        let mut width = data[1].1.0.clone();
+        width[4] = -0.5;
+        let hair = layers[1].id[1];
+        assert!(error(HairFrame { width: &width, ..of(1) }).contains(&format!("hair {hair}: a width is -0.5")));
+        let opacity = [0.5, f32::NAN, 0.5, 0.5, 0.5];
+        assert!(error(HairFrame { opacity: &opacity, ..of(1) }).contains(&format!("hair {hair}: the opacity is NaN")));
+    }
+
+    #[test]
+    fn colours_are_one_a_curve_or_one_a_point() {
+        let (facts, mut layers) = samples::coloured();
+        let check = |l: &[HairLayer]| ShotCheck::new(Path::new("x"), &facts, l);
+        assert!(layers[0].color_per_point() && !layers[1].color_per_point() && check(&layers).is_ok());
+        layers[0].color[5][1] = f32::NAN;
+        let error = check(&layers).unwrap_err().to_string();
+        assert!(error.contains(&format!("hair {}: a colour", layers[0].id[1])), "{error}");
+        layers[0].color.pop();
+        assert!(check(&layers).unwrap_err().to_string().contains("has 10 colours, expected 3"));
     }
 }

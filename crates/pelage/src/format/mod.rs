@@ -82,17 +82,30 @@ pub struct HairLayer {
     pub rest: Vec<[f32; 3]>,
     /// Diameters, scene units, V.
     pub width: Vec<f32>,
-    /// Linear colours, C.
+    /// Linear colours: C (one a curve) or V (one a point).
     pub color: Vec<[f32; 3]>,
     /// Opacities in [0, 1], C.
     pub opacity: Vec<f32>,
 }
 
-/// One layer at one frame: V positions (scene units relative to the origin) and V velocities (scene units a second).
-#[derive(Clone, Copy, Debug)]
+impl HairLayer {
+    /// Whether it has a colour for each point, not for each curve. (A curve has two points or more, so that a count
+    /// says which; a layer without curves has none of either.)
+    pub fn color_per_point(&self) -> bool {
+        self.color.len() > self.offsets.len()
+    }
+}
+
+/// One layer at one frame: V positions (scene units relative to the origin) and V velocities (scene units a second),
+/// and what of the layer is another at this frame.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct HairFrame<'a> {
     /// Positions, root first.
     pub position: &'a [[f32; 3]],
     /// Velocities at the same points.
     pub velocity: &'a [[f32; 3]],
+    /// Diameters at this frame, scene units, V; empty: those of the layer.
+    pub width: &'a [f32],
+    /// Opacities at this frame in [0, 1], C; empty: those of the layer.
+    pub opacity: &'a [f32],
 }

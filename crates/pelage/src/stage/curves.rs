@@ -11,6 +11,7 @@ use crate::timeline::Timeline;
 use pelage_geom::curve::resample;
 use pelage_geom::ride::{Ride, carry, rides};
 use pelage_geom::{Offsets, SurfacePoint, Vec3};
+use pelage_groom::along::point_widths;
 use rayon::prelude::*;
 use std::rc::Rc;
 
@@ -251,19 +252,21 @@ pub fn look(run: &mut Runner<'_>) -> Result<HairLayer, Error> {
     let unit_per_micrometre = (1e-6 / run.project.shot.value.shot.meters_per_unit) as f32;
     let width_of = |h: usize| {
         let n = offsets.range(h).len();
-        let own = hair.width.get(hair.offsets.range(h)).unwrap_or_default();
-        let (root, tip) = (layer.width.value as f32 * unit_per_micrometre, layer.width.tip as f32);
-        (0..n).map(move |k| {
-            let t = k as f32 / (n - 1).max(1) as f32;
-            if own.is_empty() { root * (1.0 + (tip - 1.0) * t) } else { along(own, t) }
-        })
+        let own = &hair.width[hair.offsets.range(h)];
+        (0..n).map(move |k| along(own, k as f32 / (n - 1).max(1) as f32))
+    };
+    let width = if hair.width.is_empty() {
+        let root = vec![layer.width.value as f32 * unit_per_micrometre; offsets.len()];
+        point_widths(&root, &offsets, &layer.width.stations())
+    } else {
+        (0..offsets.len()).flat_map(width_of).collect()
     };
     let faces = |skin: &Skin| hair.root.iter().map(|p| skin.mesh.face[p.triangle as usize] as i32).collect();
     let skin = if hair.root.is_empty() { None } else { Some(groom::skin(run)?) };
     let color = layer.color.value.map(|x| x as f32);
     Ok(HairLayer {
         name: layer.name.clone(),
-        width: (0..offsets.len()).flat_map(width_of).collect(),
+        width,
         skin_face: skin.as_deref().map(faces).unwrap_or_default(),
         skin_bary: hair.root.iter().map(|p| p.bary).collect(),
         id: hair.id.clone(),

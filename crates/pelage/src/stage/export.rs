@@ -10,6 +10,7 @@ use crate::files::unfinished;
 use crate::format::mcap::{self, McapHair};
 use crate::format::{FormatError, HairFrame, HairLayer, ShotFacts, ply, usd::UsdHair};
 use pelage_geom::Offsets;
+use pelage_groom::along::{point_colors, point_widths};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -103,22 +104,24 @@ pub fn look(run: &mut Runner<'_>, i: usize) -> Result<HairLayer, Error> {
     let width = instance::column(run, What::Width(i), i)?;
     let opacity = instance::column(run, What::Opacity(i), i)?;
     let color = instance::color(run, i)?;
-    let groom = &run.project.groom.value;
-    let points = run.project.points(i);
+    let layer = &run.project.groom.value.layer[i];
+    let offsets = Offsets::uniform(roots.id.len(), run.project.points(i));
     let unit_per_micrometre = (1e-6 / run.project.shot.value.shot.meters_per_unit) as f32;
-    let tip = groom.layer[i].width.tip as f32;
-    let taper: Vec<f32> = (0..points).map(|k| 1.0 + (tip - 1.0) * (k as f32 / (points - 1) as f32)).collect();
+    let width: Vec<f32> = width.iter().map(|w| w * unit_per_micrometre).collect();
     Ok(HairLayer {
-        name: groom.layer[i].name.clone(),
-        offsets: Offsets::uniform(roots.id.len(), points),
+        name: layer.name.clone(),
         skin_face: roots.root.iter().map(|p| skin.mesh.face[p.triangle as usize] as i32).collect(),
         skin_bary: roots.root.iter().map(|p| p.bary).collect(),
         id: roots.id.clone(),
         root_uv: roots.uv.clone(),
         rest: Vec::new(),
-        width: width.iter().flat_map(|w| taper.iter().map(move |t| w * unit_per_micrometre * t)).collect(),
-        color,
+        width: point_widths(&width, &offsets, &layer.width.stations()),
+        color: match layer.color.stations() {
+            Some(ramp) => point_colors(&color, &offsets, &ramp),
+            None => color,
+        },
         opacity: opacity.iter().map(|o| o.clamp(0.0, 1.0)).collect(),
+        offsets,
     })
 }
 
@@ -150,19 +153,20 @@ pub fn write(run: &mut Runner<'_>, what: What, format: ExportFormat) -> Result<(
             let mut file = McapHair::create(&part, &facts, &hair_layers(run)?)?;
             frames(run, &facts, |frame, hair| Ok(file.write_frame(frame, hair)?))?;
             file.finish()?;
-            let points = {
+            let sizes = {
                 let layers = hair_layers(run)?;
                 mcap::verify_layers(&part, &facts, &layers)?;
-                layers.iter().map(|l| l.offsets.total()).collect::<Vec<_>>()
+                layers.iter().map(|l| [l.offsets.len(), l.offsets.total()]).collect::<Vec<_>>()
             };
-            mcap::verify_frames(&part, &facts, &points)?;
+            mcap::verify_frames(&part, &facts, &sizes)?;
         }
         ExportFormat::Ply => {
             let layers = hair_layers(run)?;
             frames(run, &facts, |frame, hair| {
                 let part = parts.add(&out, format!("hair.{frame:04}.ply"));
                 ply::write_hair(&part, &facts, &layers, hair)?;
-                verify_ply(&part, &layers, hair)
+                verify_ply(&part, &layers, hair)?;
+                Ok(ply::verify_hair(&part, &facts, &layers, hair)?)
             })?;
         }
     }
@@ -192,15 +196,18 @@ fn frames(
                 });
             }
         }
-        let hair: Vec<HairFrame<'_>> =
-            now.iter().zip(&velocity).map(|(position, velocity)| HairFrame { position, velocity }).collect();
+        let hair: Vec<HairFrame<'_>> = now
+            .iter()
+            .zip(&velocity)
+            .map(|(position, velocity)| HairFrame { position, velocity, ..HairFrame::default() })
+            .collect();
         write(frame, &hair)?;
         now = next.unwrap_or_default();
     }
     Ok(())
 }
 
-/// Reads a PLY file back: ids, counts and positions must be what was written.
+/// Reads a PLY file back as curves: ids, counts and positions must be what was written.
 fn verify_ply(path: &Path, layers: &[HairLayer], hair: &[HairFrame<'_>]) -> Result<(), Error> {
     let read = ply::read_curves(path)?.strands;
     let same = read.id.iter().eq(layers.iter().flat_map(|l| &l.id))

@@ -5,11 +5,11 @@ use super::skin::Texel;
 use super::tables::{decode, encode, id_columns, ids_of, root_columns, roots_of, table, vector_columns, vectors_of};
 use super::{Skin, What, candidate_density, groom, layer_seed};
 use crate::Error;
-use crate::config::{Feature, MapRef};
+use crate::config::{Feature, Guard, MapRef};
 use crate::format::ply::Column;
 use pelage_geom::{SurfacePoint, TiledMap, rng};
 use pelage_groom::candidates::{Candidates, candidates as find_candidates};
-use pelage_groom::instance::{Density, Feature as FeatureSource, Roots, colour_column, feature_column};
+use pelage_groom::instance::{Density, Feature as FeatureSource, Roots, colour_column, feature_column, scale_guards};
 use pelage_groom::instance::{roots as find_roots, weights as find_weights};
 use pelage_groom::triangulate::{mirrored_charts, triangulate};
 use std::rc::Rc;
@@ -182,10 +182,11 @@ fn feature_map(run: &mut Runner<'_>, f: &Feature) -> Result<Option<TiledMap>, Er
 /// A column of one number per hair: length in scene units, root diameter in micrometres, opacity.
 pub fn column(run: &mut Runner<'_>, what: What, i: usize) -> Result<Vec<f32>, Error> {
     let layer = &run.project.groom.value.layer[i];
-    let (name, feature) = match what {
-        What::Length(_) => ("length", layer.length.clone()),
-        What::Width(_) => ("width", layer.width.feature()),
-        What::Opacity(_) => ("opacity", layer.opacity.clone()),
+    let guard = |factor: fn(&Guard) -> f64| layer.guard.as_ref().map(|g| (g.percent, factor(g) as f32));
+    let (name, feature, guard) = match what {
+        What::Length(_) => ("length", layer.length.clone(), guard(|g| g.length)),
+        What::Width(_) => ("width", layer.width.feature(), guard(|g| g.width)),
+        What::Opacity(_) => ("opacity", layer.opacity.clone(), None),
         other => unreachable!("{other:?} is not a column"),
     };
     let read = |bytes: &Vec<u8>| Some(decode(bytes)?.get("hair")?.f32(name)?.to_vec());
@@ -200,7 +201,11 @@ pub fn column(run: &mut Runner<'_>, what: What, i: usize) -> Result<Vec<f32>, Er
         noise: feature.noise as f32,
         channel: rng::channel(name),
     };
-    let values = feature_column(&roots, &source, u64::from(layer_seed(&layer.name)));
+    let seed = u64::from(layer_seed(&layer.name));
+    let mut values = feature_column(&roots, &source, seed);
+    if let Some((share, factor)) = guard {
+        scale_guards(&mut values, &roots, share, factor, seed);
+    }
     let file = encode(&format!("{name} of every hair"), &[table("hair", vec![(name, Column::F32(values.clone()))])]);
     run.keep(what, Counts::new(), &[("data.ply", &file)])?;
     Ok(values)

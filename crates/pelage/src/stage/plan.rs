@@ -214,11 +214,8 @@ impl Plan {
                 plan.add(what, name(part), Stage::Instance, recipe, reads);
             };
             let column = |part: &str, f: &Feature| {
-                Recipe::new(&format!("instance/{part}"), version::COLUMN).with(r.feature(
-                    part,
-                    &format!("layer[{i}].{part}"),
-                    f,
-                ))
+                let recipe = Recipe::new(&format!("instance/{part}"), version::COLUMN);
+                r.guard(i, part, recipe.with(r.feature(part, &format!("layer[{i}].{part}"), f)))
             };
             add(What::Candidates(i), "candidates", r.candidates(i), &[]);
             add(What::Roots(i), "roots", r.roots(i), &[What::Candidates(i)]);
@@ -458,6 +455,35 @@ impl<'a> Reader<'a> {
         r.with(layer.on_off.iter().flat_map(|m| self.map(&format!("layer[{i}].on_off"), m)))
     }
 
+    /// What the column `part` of a layer reads of its guard hairs; nothing if it has none.
+    fn guard(&self, i: usize, part: &str, mut r: Recipe) -> Recipe {
+        let Some(g) = &self.project.groom.value.layer[i].guard else { return r };
+        let factor = match part {
+            "length" => g.length,
+            "width" => g.width,
+            _ => return r,
+        };
+        for (key, value) in [("percent", g.percent), (part, factor)] {
+            r = r.param(&format!("guard.{key}"), value, self.in_groom(&format!("layer[{i}].guard.{key}")));
+        }
+        r
+    }
+
+    /// What makes columns of points of a layer's columns of hairs: it is read where points are written or drawn.
+    fn along(&self, mut r: Recipe) -> Recipe {
+        for (i, layer) in self.project.groom.value.layer.iter().enumerate() {
+            let at = |key: &str| format!("layer[{i}].{key}");
+            r = match &layer.width.profile {
+                Some(p) => r.param(&at("width.profile"), format!("{p:?}"), self.in_groom(&at("width.profile"))),
+                None => r.param(&at("width.tip"), layer.width.tip(), self.in_groom(&at("width.tip"))),
+            };
+            if let Some(ramp) = &layer.color.ramp {
+                r = r.param(&at("color.ramp"), format!("{ramp:?}"), self.in_groom(&at("color.ramp")));
+            }
+        }
+        r
+    }
+
     fn color(&self, i: usize) -> Recipe {
         let c = &self.project.groom.value.layer[i].color;
         let at = self.in_groom(&format!("layer[{i}].color"));
@@ -521,11 +547,7 @@ impl<'a> Reader<'a> {
         ] {
             r = r.param(key, value, self.in_shot(&format!("shot.{key}")));
         }
-        for (i, layer) in self.project.groom.value.layer.iter().enumerate() {
-            let at = format!("layer[{i}].width.tip");
-            r = r.param(&at, layer.width.tip, self.in_groom(&at));
-        }
-        r
+        self.along(r)
     }
 
     fn picture(&self) -> Recipe {
@@ -536,10 +558,6 @@ impl<'a> Reader<'a> {
         {
             r = r.param(key, value, self.in_shot(&format!("preview.{key}")));
         }
-        for (i, layer) in self.project.groom.value.layer.iter().enumerate() {
-            let at = format!("layer[{i}].width.tip");
-            r = r.param(&at, layer.width.tip, self.in_groom(&at));
-        }
-        r.param("up", format!("{:?}", self.project.shot.value.shot.up), self.in_shot("shot.up"))
+        self.along(r).param("up", format!("{:?}", self.project.shot.value.shot.up), self.in_shot("shot.up"))
     }
 }

@@ -72,8 +72,11 @@ fn thinned(layer: HairLayer, every: usize) -> HairLayer {
     HairLayer {
         width: nth(&layer.width, &layer.offsets, every).map(|w| w * every as f32).collect(),
         offsets: Offsets::from_counts(layer.offsets.counts().step_by(every)),
-        opacity: layer.opacity.into_iter().step_by(every).collect(),
-        color: layer.color.into_iter().step_by(every).collect(),
+        opacity: layer.opacity.iter().copied().step_by(every).collect(),
+        color: match layer.color_per_point() {
+            true => nth(&layer.color, &layer.offsets, every).collect(),
+            false => layer.color.iter().copied().step_by(every).collect(),
+        },
         ..HairLayer::default()
     }
 }
@@ -173,4 +176,23 @@ fn save(run: &mut Runner<'_>, what: What, name: &str, picture: &Image) -> Result
     let part = unfinished(&out.join(name));
     write_png(&part, picture.width, picture.height, &picture.to_srgb8())?;
     export::publish(run, what, vec![(part, name.to_owned())])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thinned_hair_keeps_its_colours_at_its_points() {
+        let offsets = Offsets::from_counts([2, 3, 4]);
+        let layer = HairLayer { width: vec![0.5; 9], opacity: vec![1.0, 0.5, 0.25], offsets, ..HairLayer::default() };
+        let hairs: Vec<[f32; 3]> = (0..3).map(|h| [h as f32; 3]).collect();
+        let points: Vec<[f32; 3]> = (0..9).map(|p| [p as f32; 3]).collect();
+        let of = |color: &[[f32; 3]]| thinned(HairLayer { color: color.to_vec(), ..layer.clone() }, 2);
+        assert_eq!(of(&hairs).color, [[0.0; 3], [2.0; 3]]);
+        let drawn = of(&points);
+        assert_eq!(drawn.color, [0.0f32, 1.0, 5.0, 6.0, 7.0, 8.0].map(|p| [p; 3]));
+        assert_eq!((drawn.offsets, drawn.width), (Offsets::from_counts([2, 4]), vec![1.0; 6]));
+        assert_eq!(drawn.opacity, [1.0, 0.25]);
+    }
 }

@@ -23,9 +23,10 @@ type Field = (&'static str, Kind, bool);
 
 pub(super) const TOPOLOGY: &str = "pelage.HairTopology";
 pub(super) const FRAME: &str = "pelage.HairFrame";
+pub(super) const LOOK: &str = "pelage.HairLook";
 
 /// C curves with V points: counts (C), id (C), root_uv (2 C), skin_face and skin_bary (C and 2 C, or none), rest (3 V),
-/// width (V), color (3 C), opacity (C).
+/// width (V), color (3 C: one a curve, or 3 V: one a point), opacity (C).
 const TOPOLOGY_FIELDS: [Field; 10] = [
     ("name", Kind::String, false),
     ("counts", Kind::UInt32, true),
@@ -47,6 +48,10 @@ const FRAME_FIELDS: [Field; 5] = [
     ("position", Kind::Float, true),
     ("velocity", Kind::Float, true),
 ];
+
+/// What a frame has instead of the layer's columns: frame, width (V, or none), opacity (C, or none).
+const LOOK_FIELDS: [Field; 3] =
+    [("frame", Kind::Int32, false), ("width", Kind::Float, true), ("opacity", Kind::Float, true)];
 
 /// Builds a protobuf message in a buffer.
 #[derive(Default)]
@@ -80,8 +85,17 @@ impl Writer {
     }
 }
 
-/// The description of both messages: a serialised `google.protobuf.FileDescriptorSet`.
+/// The description of topology and frame: a serialised `google.protobuf.FileDescriptorSet`.
 pub(super) fn descriptor() -> Vec<u8> {
+    describe("pelage/hair.proto", &[("HairTopology", &TOPOLOGY_FIELDS), ("HairFrame", &FRAME_FIELDS)])
+}
+
+/// The description of a look, apart so that files without looks are what they were before there were any.
+pub(super) fn look_descriptor() -> Vec<u8> {
+    describe("pelage/look.proto", &[("HairLook", &LOOK_FIELDS)])
+}
+
+fn describe(file_name: &str, messages: &[(&str, &[Field])]) -> Vec<u8> {
     let message = |name: &str, fields: &[Field]| {
         let mut out = Writer::default();
         out.bytes(1, name.as_bytes());
@@ -96,10 +110,9 @@ pub(super) fn descriptor() -> Vec<u8> {
         out.0
     };
     let mut file = Writer::default();
-    file.bytes(1, b"pelage/hair.proto");
+    file.bytes(1, file_name.as_bytes());
     file.bytes(2, b"pelage");
-    file.bytes(4, &message("HairTopology", &TOPOLOGY_FIELDS));
-    file.bytes(4, &message("HairFrame", &FRAME_FIELDS));
+    messages.iter().for_each(|(name, fields)| file.bytes(4, &message(name, fields)));
     file.bytes(12, b"proto3");
     let mut set = Writer::default();
     set.bytes(1, &file.0);
@@ -134,6 +147,16 @@ pub(super) fn encode_frame(out: &mut Vec<u8>, frame: i32, time: f64, origin: &[f
     writer.packed(3, origin);
     writer.packed(4, data.position);
     writer.packed(5, data.velocity);
+    *out = writer.0;
+}
+
+/// Widths and opacities of a frame as a `HairLook` message, in `out`, whose memory is used again.
+pub(super) fn encode_look(out: &mut Vec<u8>, frame: i32, data: &HairFrame) {
+    out.clear();
+    let mut writer = Writer(std::mem::take(out));
+    writer.number(1, i64::from(frame) as u64);
+    writer.packed(2, data.width);
+    writer.packed(3, data.opacity);
     *out = writer.0;
 }
 
@@ -248,6 +271,21 @@ pub(super) fn decode_frame(message: &[u8]) -> Result<Frame, Broken> {
     Ok(out)
 }
 
+/// Decodes a `HairLook` message: frame, widths, opacities.
+pub(super) fn decode_look(message: &[u8]) -> Result<(i32, Vec<f32>, Vec<f32>), Broken> {
+    let mut out = (0, vec![], vec![]);
+    fields(message, |field, value| {
+        match (field, value) {
+            (1, Value::Number(n)) => out.0 = n as i32,
+            (2, Value::Bytes(b)) => unpack(&mut out.1, b)?,
+            (3, Value::Bytes(b)) => unpack(&mut out.2, b)?,
+            _ => {}
+        }
+        Ok(())
+    })?;
+    Ok(out)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -260,7 +298,10 @@ mod tests {
         }
         let (position, velocity) = (vec![[1.0, 2.0, 3.0], [-4.0, 5.5, 6.0]], vec![[0.0; 3]; 2]);
         let mut bytes = vec![1, 2, 3];
-        encode_frame(&mut bytes, -5, 0.125, &[1.0, 0.0, 2.0], &HairFrame { position: &position, velocity: &velocity });
+        let data = HairFrame { position: &position, velocity: &velocity, width: &[0.5, 0.25], opacity: &[0.75] };
+        encode_look(&mut bytes, -7, &data);
+        assert_eq!(decode_look(&bytes).unwrap(), (-7, vec![0.5, 0.25], vec![0.75]));
+        encode_frame(&mut bytes, -5, 0.125, &[1.0, 0.0, 2.0], &data);
         let back = decode_frame(&bytes).unwrap();
         assert_eq!(back, Frame { frame: -5, time: 0.125, origin: vec![1.0, 0.0, 2.0], position, velocity });
     }
@@ -275,6 +316,7 @@ mod tests {
             let _ = decode_layer(&bad);
             let _ = decode_layer(&good[..i]);
             let _ = decode_frame(&bad);
+            let _ = decode_look(&bad);
         }
         assert!(decode_layer(&[0xff; 20]).is_err());
         // A list that claims more bytes than there are.

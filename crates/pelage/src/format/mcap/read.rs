@@ -3,7 +3,7 @@
 use super::record::{self, HEAD, MAGIC, Record, op};
 use super::{SHOT, facts_from_map, log_time, proto};
 use crate::format::bytes::{Broken, Bytes};
-use crate::format::check::{Bounds, read_error};
+use crate::format::check::{Bounds, is_width, read_error};
 use crate::format::{FormatError, HairLayer, ShotFacts};
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -36,6 +36,8 @@ struct LayerPlaces {
     name: String,
     topology: Vec<Place>,
     frames: Vec<Place>,
+    /// Widths and opacities of frames that have their own.
+    looks: Vec<Place>,
 }
 
 /// One layer at one frame. V points.
@@ -51,6 +53,10 @@ pub struct McapFrame {
     pub position: Vec<[f32; 3]>,
     /// Velocities, scene units a second, V.
     pub velocity: Vec<[f32; 3]>,
+    /// Diameters at this frame, scene units, V; empty: those of the layer.
+    pub width: Vec<f32>,
+    /// Opacities at this frame, C; empty: those of the layer.
+    pub opacity: Vec<f32>,
 }
 
 /// Opens a file that [`McapHair`](super::McapHair) wrote: reads its index and its facts.
@@ -67,6 +73,12 @@ pub fn read_hair_mcap(path: &Path) -> Result<HairMcap, FormatError> {
             let found = layer.frames.len();
             let what = format!("has {found} frames of {}, or at other times than stated", facts.frames.len());
             return Err(bad(what).at(format!("layer {:?}", layer.name)));
+        }
+        let of_a_frame = |p: &Place| layer.frames.binary_search_by_key(&p.log_time, |f| f.log_time).is_ok();
+        let one_each = layer.looks.windows(2).all(|w| w[0].log_time < w[1].log_time);
+        if !one_each || !layer.looks.iter().all(of_a_frame) {
+            return Err(bad("has widths or opacities at other times than its frames".into())
+                .at(format!("layer {:?}", layer.name)));
         }
     }
     Ok(HairMcap { path: path.to_path_buf(), file, len, facts, layers })
@@ -89,9 +101,10 @@ impl HairMcap {
         self.message(layer, place, "topology", |_, message| {
             let read = proto::decode_layer(message)?;
             let (curves, points) = (read.offsets.len(), read.offsets.total());
-            let sized = [read.id.len(), read.root_uv.len(), read.color.len(), read.opacity.len()];
+            let sized = [read.id.len(), read.root_uv.len(), read.opacity.len()];
             let skin = [read.skin_face.len(), read.skin_bary.len()];
-            let wrong = sized.iter().any(|&n| n != curves) || read.width.len() != points;
+            let colored = [curves, points].contains(&read.color.len());
+            let wrong = sized.iter().any(|&n| n != curves) || !colored || read.width.len() != points;
             if wrong || (skin != [curves; 2] && skin != [0; 2]) {
                 return Err("its columns differ in length".into());
             }
@@ -103,7 +116,9 @@ impl HairMcap {
     pub fn frame(&mut self, index: usize, layer: usize) -> Result<McapFrame, FormatError> {
         let number = self.facts.frames[index];
         let place = self.layers[layer].frames[index];
-        self.message(layer, place, &format!("frame {number}"), |sequence, message| {
+        let looks = &self.layers[layer].looks;
+        let look = looks.binary_search_by_key(&place.log_time, |p| p.log_time).ok().map(|i| looks[i]);
+        let mut frame = self.message(layer, place, &format!("frame {number}"), |sequence, message| {
             let read = proto::decode_frame(message)?;
             let sized = read.position.len() == read.velocity.len();
             match read.origin.try_into() {
@@ -113,10 +128,25 @@ impl HairMcap {
                     origin,
                     position: read.position,
                     velocity: read.velocity,
+                    width: vec![],
+                    opacity: vec![],
                 }),
                 _ => Err("its number, origin or sizes are wrong".into()),
             }
-        })
+        })?;
+        if let Some(place) = look {
+            let points = frame.position.len();
+            (frame.width, frame.opacity) =
+                self.message(layer, place, &format!("look of frame {number}"), |sequence, message| {
+                    let (found, width, opacity) = proto::decode_look(message)?;
+                    let sized = width.is_empty() || width.len() == points;
+                    if found != number || sequence != number as u32 || !sized {
+                        return Err("its number or sizes are wrong".into());
+                    }
+                    Ok((width, opacity))
+                })?;
+        }
+        Ok(frame)
     }
 
     /// Decodes a message with `decode`, which is given its sequence number and its bytes.
@@ -240,6 +270,7 @@ impl Index {
             match fact("part") {
                 "topology" => layer.topology = found,
                 "frames" => layer.frames = found,
+                "look" => layer.looks = found,
                 _ => {}
             }
         }
@@ -267,17 +298,25 @@ pub fn verify_layers(path: &Path, facts: &ShotFacts, layers: &[HairLayer]) -> Re
     Ok(())
 }
 
-/// Opens an exported file again and checks every frame: as many points as its layer has (`points`, one a layer), the
-/// origin, all values finite. Apart from [`verify_layers`], so that layers need not lie beside frames in memory.
-pub fn verify_frames(path: &Path, facts: &ShotFacts, points: &[usize]) -> Result<(), FormatError> {
+/// Opens an exported file again and checks every frame: as many points as its layer has (`sizes`: curves and points, one
+/// entry a layer), the origin, all values finite, widths not negative. Apart from [`verify_layers`], so that layers need not lie beside frames in memory.
+pub fn verify_frames(path: &Path, facts: &ShotFacts, sizes: &[[usize; 2]]) -> Result<(), FormatError> {
     let mut file = read_hair_mcap(path)?;
-    for (i, points) in points.iter().enumerate() {
+    for (i, [curves, points]) in sizes.iter().enumerate() {
         for index in 0..facts.frames.len() {
             let frame = file.frame(index, i)?;
-            let sized = frame.position.len() == *points && frame.origin == facts.origin;
+            let look = [(frame.width.len(), *points), (frame.opacity.len(), *curves)];
+            let sized = frame.position.len() == *points
+                && frame.origin == facts.origin
+                && look.iter().all(|(n, wanted)| *n == 0 || n == wanted);
             let finite = Bounds::of(&frame.position).is_some() && Bounds::of(&frame.velocity).is_some();
-            if !sized || !finite {
-                let what = if sized { "a value is not finite" } else { "the number of points or the origin is wrong" };
+            let sound = frame.width.iter().all(|w| is_width(*w)) && frame.opacity.iter().all(|x| x.is_finite());
+            if !sized || !finite || !sound {
+                let what = if sized {
+                    "a value is not finite, or a width is negative"
+                } else {
+                    "the number of points or curves, or the origin, is wrong"
+                };
                 return Err(not_exported(path, what).at(format!("layer {i}, frame {}", frame.frame)));
             }
         }
@@ -298,7 +337,8 @@ mod tests {
 
     fn write_frame(out: &mut McapHair, layers: &[HairLayer], frame: i32) -> Result<(), FormatError> {
         let data: Vec<_> = layers.iter().map(|l| samples::frame(l, frame)).collect();
-        let data: Vec<_> = data.iter().map(|(p, v)| HairFrame { position: p, velocity: v }).collect();
+        let data: Vec<_> =
+            data.iter().map(|(p, v)| HairFrame { position: p, velocity: v, ..HairFrame::default() }).collect();
         out.write_frame(frame, &data)
     }
 
@@ -311,6 +351,10 @@ mod tests {
         std::fs::read(path).unwrap()
     }
 
+    fn sizes(layers: &[HairLayer]) -> Vec<[usize; 2]> {
+        layers.iter().map(|l| [l.offsets.len(), l.offsets.total()]).collect()
+    }
+
     #[test]
     fn what_is_written_is_read_back() {
         let dir = tempfile::tempdir().unwrap();
@@ -318,9 +362,9 @@ mod tests {
         let path = dir.path().join("a.mcap");
         let bytes = write(&path, &facts, &layers);
         verify_layers(&path, &facts, &layers).unwrap();
-        let points: Vec<usize> = layers.iter().map(|l| l.offsets.total()).collect();
-        verify_frames(&path, &facts, &points).unwrap();
-        assert!(verify_frames(&path, &facts, &points.iter().map(|n| n + 1).collect::<Vec<_>>()).is_err());
+        verify_frames(&path, &facts, &sizes(&layers)).unwrap();
+        let other: Vec<_> = sizes(&layers).iter().map(|[c, n]| [*c, n + 1]).collect();
+        assert!(verify_frames(&path, &facts, &other).is_err());
         let mut file = read_hair_mcap(&path).unwrap();
         assert_eq!(file.facts(), &facts);
         for (i, layer) in layers.iter().enumerate() {
@@ -328,7 +372,9 @@ mod tests {
             for (k, &number) in facts.frames.iter().enumerate() {
                 let (position, velocity) = samples::frame(layer, number);
                 let time = f64::from(number - 1001) / 24.0;
-                let expected = McapFrame { frame: number, time, origin: facts.origin, position, velocity };
+                let (width, opacity) = (vec![], vec![]);
+                let expected =
+                    McapFrame { frame: number, time, origin: facts.origin, position, velocity, width, opacity };
                 assert_eq!(file.frame(k, i).unwrap(), expected);
             }
         }
@@ -340,6 +386,56 @@ mod tests {
         assert_eq!(summary.metadata[0].1["extra.version"], "0.1.0");
         // The same shot gives the same bytes.
         assert_eq!(bytes, write(&dir.path().join("b.mcap"), &facts, &layers));
+    }
+
+    #[test]
+    fn colours_of_points_are_read_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let (facts, layers) = samples::coloured();
+        let path = dir.path().join("a.mcap");
+        write(&path, &facts, &layers);
+        verify_layers(&path, &facts, &layers).unwrap();
+        assert_eq!(read_hair_mcap(&path).unwrap().layer(0).unwrap().color, layers[0].color);
+        assert!(verify_layers(&path, &facts, &samples::shot().1).is_err());
+    }
+
+    #[test]
+    fn widths_and_opacities_of_frames_are_messages() {
+        let dir = tempfile::tempdir().unwrap();
+        let (facts, layers) = samples::shot();
+        let path = dir.path().join("a.mcap");
+        let mut out = McapHair::create(&path, &facts, &layers).unwrap();
+        // The second layer brings its own from frame 1002 on, at the last one widths only.
+        let own = |frame: i32| match samples::look(&layers[1], frame) {
+            _ if frame == 1001 => (vec![], vec![]),
+            (width, _) if frame == 1003 => (width, vec![]),
+            both => both,
+        };
+        for &frame in &facts.frames {
+            let data: Vec<_> = layers.iter().map(|l| samples::frame(l, frame)).collect();
+            let (width, opacity) = own(frame);
+            let mut data: Vec<_> =
+                data.iter().map(|(p, v)| HairFrame { position: p, velocity: v, ..HairFrame::default() }).collect();
+            data[1] = HairFrame { width: &width, opacity: &opacity, ..data[1] };
+            out.write_frame(frame, &data).unwrap();
+        }
+        out.finish().unwrap();
+        verify_layers(&path, &facts, &layers).unwrap();
+        verify_frames(&path, &facts, &sizes(&layers)).unwrap();
+        let other: Vec<_> = sizes(&layers).iter().map(|[c, n]| [c + 1, *n]).collect();
+        assert!(verify_frames(&path, &facts, &other).is_err());
+        let mut file = read_hair_mcap(&path).unwrap();
+        for (k, &number) in facts.frames.iter().enumerate() {
+            let (still, moving) = (file.frame(k, 0).unwrap(), file.frame(k, 1).unwrap());
+            assert!(still.width.is_empty() && still.opacity.is_empty());
+            assert_eq!((moving.width, moving.opacity), own(number));
+        }
+        let summary = inspect(&path).unwrap();
+        let look = &summary.channels[&5];
+        assert_eq!(
+            (look.topic.as_str(), look.schema.as_str(), look.messages),
+            ("/hair/2nd/look", "pelage.HairLook", 2)
+        );
     }
 
     #[test]
@@ -362,9 +458,9 @@ mod tests {
         let path = dir.path().join("a.mcap");
         write(&path, &facts, &layers);
         verify_layers(&path, &facts, &layers).unwrap();
-        let points: Vec<usize> = layers.iter().map(|l| l.offsets.total()).collect();
-        verify_frames(&path, &facts, &points).unwrap();
-        assert!(verify_frames(&path, &facts, &points.iter().map(|n| n + 1).collect::<Vec<_>>()).is_err());
+        verify_frames(&path, &facts, &sizes(&layers)).unwrap();
+        let other: Vec<_> = sizes(&layers).iter().map(|[c, n]| [*c, n + 1]).collect();
+        assert!(verify_frames(&path, &facts, &other).is_err());
         assert!(inspect(&path).unwrap().chunks > 5);
     }
 

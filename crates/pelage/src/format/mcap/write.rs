@@ -22,6 +22,8 @@ pub struct McapHair {
     out: Option<Writer<BufWriter<File>>>,
     /// Channel of the frames of each layer.
     channels: Vec<u16>,
+    /// Names of the layers, and the channels of their looks once a frame has brought one.
+    looks: Vec<(String, Option<u16>)>,
     buffer: Vec<u8>,
 }
 
@@ -33,7 +35,8 @@ impl McapHair {
         let out = BufWriter::with_capacity(1 << 20, file);
         let out = options().create(out).map_err(|e| mcap_error(path, e))?;
         let (path, facts) = (path.to_path_buf(), facts.clone());
-        let mut hair = McapHair { path, facts, check, out: Some(out), channels: vec![], buffer: vec![] };
+        let looks = layers.iter().map(|l| (l.name.clone(), None)).collect();
+        let mut hair = McapHair { path, facts, check, out: Some(out), channels: vec![], looks, buffer: vec![] };
         hair.write_start(layers)?;
         Ok(hair)
     }
@@ -46,13 +49,7 @@ impl McapHair {
         let mut topologies = vec![];
         for (i, layer) in layers.iter().enumerate() {
             for (schema, part) in [(proto::TOPOLOGY, "topology"), (proto::FRAME, "frames")] {
-                let topic = format!("/hair/{}/{part}", layer.name);
-                let facts = [("layer", layer.name.clone()), ("index", i.to_string()), ("part", part.to_owned())];
-                let facts = facts.into_iter().map(|(k, v)| (k.to_owned(), v)).collect();
-                let channel = self.write(|out| {
-                    let schema = out.add_schema(schema, "protobuf", &descriptor)?;
-                    out.add_channel(schema, &topic, "protobuf", &facts)
-                })?;
+                let channel = self.add_channel(&layer.name, i, part, schema, &descriptor)?;
                 if part == "frames" { self.channels.push(channel) } else { topologies.push(channel) }
             }
         }
@@ -64,6 +61,23 @@ impl McapHair {
         Ok(())
     }
 
+    fn add_channel(
+        &mut self,
+        layer: &str,
+        index: usize,
+        part: &str,
+        schema: &str,
+        descriptor: &[u8],
+    ) -> Result<u16, FormatError> {
+        let topic = format!("/hair/{layer}/{part}");
+        let facts = [("layer", layer.to_owned()), ("index", index.to_string()), ("part", part.to_owned())];
+        let facts = facts.into_iter().map(|(k, v)| (k.to_owned(), v)).collect();
+        self.write(|out| {
+            let schema = out.add_schema(schema, "protobuf", descriptor)?;
+            out.add_channel(schema, &topic, "protobuf", &facts)
+        })
+    }
+
     /// Writes the next frame, with one entry for each layer.
     pub fn write_frame(&mut self, frame: i32, layers: &[HairFrame]) -> Result<(), FormatError> {
         self.check.frame(frame, layers)?;
@@ -73,9 +87,25 @@ impl McapHair {
         for (i, data) in layers.iter().enumerate() {
             proto::encode_frame(&mut buffer, frame, time, &self.facts.origin, data);
             self.write_message(self.channels[i], frame, &buffer)?;
+            if !data.width.is_empty() || !data.opacity.is_empty() {
+                let channel = self.look_channel(i)?;
+                proto::encode_look(&mut buffer, frame, data);
+                self.write_message(channel, frame, &buffer)?;
+            }
         }
         self.buffer = buffer;
         Ok(())
+    }
+
+    /// The channel of a layer's looks, added when the first one comes.
+    fn look_channel(&mut self, i: usize) -> Result<u16, FormatError> {
+        if let Some(channel) = self.looks[i].1 {
+            return Ok(channel);
+        }
+        let name = self.looks[i].0.clone();
+        let channel = self.add_channel(&name, i, "look", proto::LOOK, &proto::look_descriptor())?;
+        self.looks[i].1 = Some(channel);
+        Ok(channel)
     }
 
     fn write_message(&mut self, channel_id: u16, frame: i32, data: &[u8]) -> Result<(), FormatError> {

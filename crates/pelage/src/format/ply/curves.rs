@@ -2,7 +2,7 @@
 
 use super::row::Row;
 use super::source::{Plan, Source, read_bytes};
-use super::table::{Column, Table, split_ids, write_tables};
+use super::table::{Column, Table, read_tables, split_ids, write_tables};
 use super::write_whole;
 use crate::format::{FormatError, HairFrame, HairLayer, ShotFacts};
 use pelage_geom::{Offsets, Strands};
@@ -32,8 +32,9 @@ const MARK: &str = "pelage hair 1";
 
 /// Writes one frame of hair: element `vertex` with `x y z` (scene units), velocities `vx vy vz` (scene units a second)
 /// and `width` (diameter, scene units), element `hair` with the range of its points (`first`, `count`), `id_lo`,
-/// `id_hi`, `layer`, and where a layer has them root `u v`, linear `r g b` and `opacity`. The units stand in the
-/// comments. Positions are 32-bit, or 64-bit and absolute where the shot has an origin.
+/// `id_hi`, `layer`, and where a layer has them root `u v`, linear `r g b` and `opacity`. If a layer has a colour for
+/// each point, `r g b` of all layers are properties of `vertex` instead. Widths and opacities are those of the frame
+/// where it has its own. The units stand in the comments. Positions are 32-bit, or 64-bit and absolute where the shot has an origin.
 pub fn write_hair(
     path: &Path,
     facts: &ShotFacts,
@@ -41,8 +42,27 @@ pub fn write_hair(
     frame: &[HairFrame<'_>],
 ) -> Result<(), FormatError> {
     check_sizes(path, layers, frame)?;
-    let tables = [vertex_table(facts, layers, frame), hair_table(layers)];
-    write_whole(path, |out| write_tables(out, &comments(facts, layers), &tables))
+    write_whole(path, |out| write_tables(out, &comments(facts, layers), &tables(facts, layers, frame)))
+}
+
+fn tables(facts: &ShotFacts, layers: &[HairLayer], frame: &[HairFrame<'_>]) -> [Table; 2] {
+    [vertex_table(facts, layers, frame), hair_table(layers, frame)]
+}
+
+/// Reads `path` back and compares every column with what [`write_hair`] was given.
+pub fn verify_hair(
+    path: &Path,
+    facts: &ShotFacts,
+    layers: &[HairLayer],
+    frame: &[HairFrame<'_>],
+) -> Result<(), FormatError> {
+    let (read, wanted) = (read_tables(path)?.tables, tables(facts, layers, frame));
+    let Some(wrong) = wanted.iter().find(|table| !read.contains(table)) else { return Ok(()) };
+    let found = read.iter().find(|t| t.name == wrong.name);
+    let column = wrong.columns.iter().find(|(name, values)| found.and_then(|t| t.column(name)) != Some(values));
+    let what = format!("{} differs from what was exported", column.map_or("a column", |c| &c.0));
+    let at = format!("element {}", wrong.name);
+    Err(FormatError::new(path, what).at(at).hint("the file is not what was exported: export it again"))
 }
 
 fn check_sizes(path: &Path, layers: &[HairLayer], frame: &[HairFrame<'_>]) -> Result<(), FormatError> {
@@ -60,8 +80,10 @@ fn check_sizes(path: &Path, layers: &[HairLayer], frame: &[HairFrame<'_>]) -> Re
         ];
         let optional = [
             ("root_uv", l.root_uv.len(), curves),
-            ("color", l.color.len(), curves),
+            ("color", l.color.len(), if l.color_per_point() { points } else { curves }),
             ("opacity", l.opacity.len(), curves),
+            ("width of the frame", f.width.len(), points),
+            ("opacity of the frame", f.opacity.len(), curves),
         ];
         let bad = exact.iter().find(|c| c.1 != c.2).or_else(|| optional.iter().find(|c| c.1 != c.2 && c.1 != 0));
         if let Some((name, found, expected)) = bad {
@@ -92,7 +114,7 @@ fn comments(facts: &ShotFacts, layers: &[HairLayer]) -> Vec<String> {
     lines.iter().map(|l| l.replace(['\n', '\r'], " ")).collect()
 }
 
-fn vertex_table(facts: &ShotFacts, layers: &[HairLayer], frame: &[HairFrame<'_>]) -> Table {
+fn vertex_table<'a>(facts: &ShotFacts, layers: &'a [HairLayer], frame: &[HairFrame<'a>]) -> Table {
     let floats = |v: &mut dyn Iterator<Item = f32>| Column::F32(v.collect());
     let mut columns = Vec::new();
     for (k, name) in ["x", "y", "z"].into_iter().enumerate() {
@@ -108,11 +130,27 @@ fn vertex_table(facts: &ShotFacts, layers: &[HairLayer], frame: &[HairFrame<'_>]
     for (k, name) in ["vx", "vy", "vz"].into_iter().enumerate() {
         columns.push((name.to_owned(), floats(&mut frame.iter().flat_map(|f| f.velocity.iter().map(move |p| p[k])))));
     }
-    columns.push(("width".to_owned(), floats(&mut layers.iter().flat_map(|l| l.width.iter().copied()))));
+    let width = |(l, f): (&'a HairLayer, &HairFrame<'a>)| if f.width.is_empty() { &l.width[..] } else { f.width };
+    columns.push(("width".to_owned(), floats(&mut layers.iter().zip(frame).flat_map(width).copied())));
+    if layers.iter().any(HairLayer::color_per_point) {
+        let colors: Vec<[f32; 3]> = layers.iter().flat_map(point_colors).collect();
+        for (k, name) in ["r", "g", "b"].into_iter().enumerate() {
+            columns.push((name.to_owned(), floats(&mut colors.iter().map(|c| c[k]))));
+        }
+    }
     Table { name: "vertex".into(), rows: columns[0].1.len(), columns }
 }
 
-fn hair_table(layers: &[HairLayer]) -> Table {
+/// A colour for each point of a layer, white without any.
+fn point_colors(l: &HairLayer) -> Vec<[f32; 3]> {
+    if l.color_per_point() {
+        return l.color.clone();
+    }
+    let of = |s: usize| l.color.get(s).copied().unwrap_or([1.0; 3]);
+    l.offsets.counts().enumerate().flat_map(|(s, n)| std::iter::repeat_n(of(s), n)).collect()
+}
+
+fn hair_table(layers: &[HairLayer], frame: &[HairFrame<'_>]) -> Table {
     let id: Vec<u64> = layers.iter().flat_map(|l| l.id.iter().copied()).collect();
     let (lo, hi) = split_ids(&id);
     let mut first = 0;
@@ -131,19 +169,21 @@ fn hair_table(layers: &[HairLayer]) -> Table {
         ("layer".into(), Column::U32(layer)),
     ];
     // A layer without a column among layers that have it gets what its absence means.
-    let mut optional = |name: &str, default: f32, value: &dyn Fn(&HairLayer, usize) -> Option<f32>| {
-        if layers.iter().any(|l| value(l, 0).is_some()) {
-            let of = |l: &HairLayer| (0..l.id.len()).map(|s| value(l, s).unwrap_or(default)).collect::<Vec<f32>>();
-            columns.push((name.to_owned(), Column::F32(layers.iter().flat_map(of).collect())));
+    let mut optional = |name: &str, default: f32, value: &dyn Fn(usize, usize) -> Option<f32>| {
+        if (0..layers.len()).any(|l| value(l, 0).is_some()) {
+            let of = |l: usize| (0..layers[l].id.len()).map(move |s| value(l, s).unwrap_or(default));
+            columns.push((name.to_owned(), Column::F32((0..layers.len()).flat_map(of).collect())));
         }
     };
     for (k, name) in ["u", "v"].into_iter().enumerate() {
-        optional(name, 0.0, &|l, s| l.root_uv.get(s).map(|c| c[k]));
+        optional(name, 0.0, &|l, s| layers[l].root_uv.get(s).map(|c| c[k]));
     }
-    for (k, name) in ["r", "g", "b"].into_iter().enumerate() {
-        optional(name, 1.0, &|l, s| l.color.get(s).map(|c| c[k]));
+    if !layers.iter().any(HairLayer::color_per_point) {
+        for (k, name) in ["r", "g", "b"].into_iter().enumerate() {
+            optional(name, 1.0, &|l, s| layers[l].color.get(s).map(|c| c[k]));
+        }
     }
-    optional("opacity", 1.0, &|l, s| l.opacity.get(s).copied());
+    optional("opacity", 1.0, &|l, s| frame[l].opacity.get(s).or(layers[l].opacity.get(s)).copied());
     Table { name: "hair".into(), rows: id.len(), columns }
 }
 

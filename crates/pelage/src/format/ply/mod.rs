@@ -10,7 +10,7 @@ mod samples;
 mod source;
 mod table;
 
-pub use curves::{Curves, parse_curves, read_curves, write_hair};
+pub use curves::{Curves, parse_curves, read_curves, verify_hair, write_hair};
 pub use mesh::{ReadMesh, parse_mesh, read_frame, read_mesh};
 pub use mesh_out::mesh_bytes;
 pub(in crate::format) use source::read_bytes;

@@ -61,7 +61,7 @@ pub struct UsdCurves {
     pub skin_face: Vec<i32>,
     /// Place on that polygon, C.
     pub skin_bary: Vec<[f32; 2]>,
-    /// Linear colours, C.
+    /// Linear colours, C or V.
     pub color: Vec<[f32; 3]>,
     /// Opacities, C.
     pub opacity: Vec<f32>,
@@ -207,6 +207,8 @@ fn floats_at(file: &mut CrateFile, attribute: Node, arity: usize, frame: Option<
 enum Per {
     Curve,
     Point,
+    /// As the file has it; one a curve of a constant.
+    Either,
 }
 
 /// Reads the columns of one prim.
@@ -246,12 +248,14 @@ impl Columns<'_> {
         Ok(self.fit(values, Per::Curve, name))
     }
 
-    /// Spreads constant values and values per curve; takes the root's of values per point.
+    /// Spreads constant values and, where points are wanted, values per curve; takes the root's of values per point
+    /// where curves are wanted.
     fn fit<T: Copy>(&mut self, values: Vec<T>, per: Per, name: &str) -> Vec<T> {
         let (curves, points) = (self.offsets.len(), self.offsets.total());
-        let wanted = if per == Per::Curve { curves } else { points };
+        let wanted = if per == Per::Point { points } else { curves };
         match (values.len(), per) {
             (n, _) if n == wanted => values,
+            (n, Per::Either) if n == points => values,
             (1, _) => vec![values[0]; wanted],
             (n, Per::Curve) if n == points => (0..curves).map(|c| values[self.offsets.range(c).start]).collect(),
             (n, Per::Point) if n == curves => {
@@ -323,7 +327,7 @@ fn read_columns(
         root_uv: columns.vectors(&["primvars:st", "primvars:uv", "primvars:surface_uv_coordinate"], Per::Curve)?,
         skin_face: columns.integers("primvars:skinprim")?.into_iter().map(|i| i as i32).collect(),
         skin_bary: columns.vectors(&["primvars:skinprimuv"], Per::Curve)?,
-        color: columns.vectors(&["primvars:displayColor"], Per::Curve)?,
+        color: columns.vectors(&["primvars:displayColor"], Per::Either)?,
         opacity: columns.scalars(&["primvars:displayOpacity"], Per::Curve)?,
         times,
         offsets: Offsets::default(),

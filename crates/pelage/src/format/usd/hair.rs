@@ -4,7 +4,7 @@ use super::curves::{UsdCurves, read_curves};
 use super::read::{CrateFile, Node as FileNode};
 use super::write::{CrateWriter, Element, Node};
 use super::{Rep, Type};
-use crate::format::check::{Bounds, ShotCheck, write_error};
+use crate::format::check::{Bounds, ShotCheck, is_width, write_error};
 use crate::format::{FormatError, HairFrame, HairLayer, ShotFacts};
 use std::fs::File;
 use std::io;
@@ -20,9 +20,10 @@ const ROOT: &str = "Hair";
 /// The file has an Xform "Hair" (moved to the origin of the shot) with one `BasisCurves` prim for each layer: cubic,
 /// catmullRom, pinned, so that every curve starts at its first point and ends at its last. `points`, `velocities` (per
 /// second) and `extent` are sampled at exactly the frames of the shot. `widths` are diameters, one a point. Uniform
-/// (one a curve): `st` and `surface_uv_coordinate` (texture coordinates of the root), `hairId`, `displayColor`,
-/// `displayOpacity`, and with a skin `skinprim`, `skinprimuv`. One a point: `rest`. Constant: `layer`, `pelage` (the
-/// facts of the shot, also in the `customLayerData` of the file).
+/// (one a curve): `st` and `surface_uv_coordinate` (texture coordinates of the root), `hairId`, `displayColor` (one a
+/// point, `vertex`, where the layer has it so), `displayOpacity`, and with a skin `skinprim`, `skinprimuv`. One a point:
+/// `rest`. Constant: `layer`, `pelage` (the facts of the shot, also in the `customLayerData` of the file). Where a frame
+/// brings widths or opacities of its own, `widths` or `displayOpacity` has a sample at every frame beside the layer's.
 pub struct UsdHair {
     path: PathBuf,
     check: ShotCheck,
@@ -39,6 +40,31 @@ struct LayerOut {
     /// Half the largest width: how far the hair reaches beyond its points.
     pad: f32,
     samples: [Vec<Rep>; 3],
+    width: Sampled,
+    opacity: Sampled,
+}
+
+/// A column that the layer has and single frames may replace.
+struct Sampled {
+    node: Node,
+    /// Its value in the layer.
+    layer: Rep,
+    /// One a frame; the layer's where the frame has none.
+    samples: Vec<Rep>,
+    /// Whether any frame has its own.
+    any: bool,
+}
+
+impl Sampled {
+    fn push(&mut self, out: &mut CrateWriter<File>, values: &[f32]) -> io::Result<()> {
+        self.any |= !values.is_empty();
+        self.samples.push(if values.is_empty() { self.layer } else { out.array(values)? });
+        Ok(())
+    }
+}
+
+fn half_widest(width: &[f32]) -> f32 {
+    width.iter().copied().fold(0.0, f32::max) / 2.0
 }
 
 impl UsdHair {
@@ -62,12 +88,14 @@ impl UsdHair {
     pub fn write_frame(&mut self, frame: i32, layers: &[HairFrame]) -> Result<()> {
         let bounds = self.check.frame(frame, layers)?;
         for ((layer, data), bounds) in self.layers.iter_mut().zip(layers).zip(bounds) {
-            let extent = bounds.padded(layer.pad);
+            let pad = if data.width.is_empty() { layer.pad } else { half_widest(data.width) };
+            let extent = bounds.padded(pad);
             let mut write = || -> io::Result<()> {
                 layer.samples[0].push(self.out.array(data.position)?);
                 layer.samples[1].push(self.out.array(data.velocity)?);
                 layer.samples[2].push(self.out.array(&extent)?);
-                Ok(())
+                layer.width.push(&mut self.out, data.width)?;
+                layer.opacity.push(&mut self.out, data.opacity)
             };
             write().map_err(|e| write_error(&self.path, &e))?;
         }
@@ -86,6 +114,10 @@ impl UsdHair {
                 for (node, samples) in nodes.into_iter().zip(&layer.samples) {
                     let samples = out.time_samples(times, samples)?;
                     out.field(node, "timeSamples", samples);
+                }
+                for column in [layer.width, layer.opacity].into_iter().filter(|c| c.any) {
+                    let samples = out.time_samples(times, &column.samples)?;
+                    out.field(column.node, "timeSamples", samples);
                 }
             }
             out.finish().map(drop)
@@ -187,21 +219,22 @@ fn write_layer(
     let extent = out.attribute(prim, "extent", "float3[]");
 
     let mut column = Columns { out, prim };
-    column.write("widths", "float[]", "vertex", &layer.width)?;
+    let width = column.sampled("widths", "vertex", &layer.width)?;
     column.write("primvars:rest", "point3f[]", "vertex", &layer.rest)?;
     column.write("primvars:st", "texCoord2f[]", "uniform", &layer.root_uv)?;
     column.write("primvars:surface_uv_coordinate", "float2[]", "uniform", &layer.root_uv)?;
     column.write("primvars:hairId", "int64[]", "uniform", bytemuck::cast_slice::<u64, i64>(&layer.id))?;
-    column.write("primvars:displayColor", "color3f[]", "uniform", &layer.color)?;
-    column.write("primvars:displayOpacity", "float[]", "uniform", &layer.opacity)?;
+    let per = if layer.color_per_point() { "vertex" } else { "uniform" };
+    column.write("primvars:displayColor", "color3f[]", per, &layer.color)?;
+    let opacity = column.sampled("primvars:displayOpacity", "uniform", &layer.opacity)?;
     if !layer.skin_face.is_empty() {
         column.write("primvars:skinprim", "int[]", "uniform", &layer.skin_face)?;
         column.write("primvars:skinprimuv", "texCoord2f[]", "uniform", &layer.skin_bary)?;
     }
     column.text("primvars:layer", &layer.name);
     column.text("primvars:pelage", facts);
-    let pad = layer.width.iter().copied().fold(0.0, f32::max) / 2.0;
-    Ok(LayerOut { points, velocities, extent, pad, samples: [vec![], vec![], vec![]] })
+    let pad = half_widest(&layer.width);
+    Ok(LayerOut { points, velocities, extent, pad, samples: [vec![], vec![], vec![]], width, opacity })
 }
 
 /// Writes attributes of one prim that have an interpolation.
@@ -217,22 +250,28 @@ impl Columns<'_> {
         Ok(())
     }
 
+    fn sampled(&mut self, name: &str, interpolation: &str, values: &[f32]) -> io::Result<Sampled> {
+        let layer = self.out.array(values)?;
+        Ok(Sampled { node: self.field(name, "float[]", interpolation, layer), layer, samples: vec![], any: false })
+    }
+
     fn text(&mut self, name: &str, text: &str) {
         let value = self.out.string(text);
         self.field(name, "string", "constant", value);
     }
 
-    fn field(&mut self, name: &str, type_name: &str, interpolation: &str, value: Rep) {
+    fn field(&mut self, name: &str, type_name: &str, interpolation: &str, value: Rep) -> Node {
         let node = self.out.attribute(self.prim, name, type_name);
         let interpolation = self.out.token(interpolation);
         self.out.field(node, "interpolation", interpolation);
         self.out.field(node, "default", value);
+        node
     }
 }
 
 /// Reads `path` back and compares it with what [`UsdHair`] was given: the facts; counts, ids and every column of every
-/// layer; the sizes and times of all samples; at the first and the last frame also that all values are finite and that
-/// the extent holds the points with their widths.
+/// layer; the sizes and times of all samples; at the first and the last frame also that all values are finite, widths
+/// not negative, and that the extent holds the points with their widths.
 pub fn verify(path: &Path, facts: &ShotFacts, layers: &[HairLayer]) -> Result<()> {
     let bad = |what: String| FormatError::new(path, what).hint("the file is not what was exported: export it again");
     if layers.is_empty() {
@@ -247,27 +286,45 @@ pub fn verify(path: &Path, facts: &ShotFacts, layers: &[HairLayer]) -> Result<()
     if prims.len() != layers.len() {
         return Err(bad(format!("has {} layers, expected {}", prims.len(), layers.len())));
     }
+    let mut moving = vec![];
     for (&prim, layer) in prims.iter().zip(layers) {
-        verify_samples(&mut file, prim, facts, layer).map_err(|e| e.at(format!("layer {:?}", layer.name)))?;
+        let found = verify_samples(&mut file, prim, facts, layer);
+        moving.push(found.map_err(|e| e.at(format!("layer {:?}", layer.name)))?);
     }
     for frame in [facts.frames.first(), facts.frames.last()].into_iter().flatten() {
         let curves = read_curves(path, Some(f64::from(*frame)))?;
-        for ((read, layer), &prim) in curves.iter().zip(layers).zip(&prims) {
+        for (((read, layer), &prim), &moving) in curves.iter().zip(layers).zip(&prims).zip(&moving) {
             let place = format!("layer {:?}, frame {frame}", layer.name);
-            verify_layer(read, facts, layer).map_err(|what| bad(what).at(place.clone()))?;
+            verify_layer(read, facts, layer, moving).map_err(|what| bad(what).at(place.clone()))?;
             verify_extent(&mut file, prim, *frame, read).map_err(|e| e.at(place))?;
         }
     }
     Ok(())
 }
 
-/// Times and sizes of all samples of a layer.
-fn verify_samples(file: &mut CrateFile, prim: FileNode, facts: &ShotFacts, layer: &HairLayer) -> Result<()> {
+/// Times and sizes of all samples of a layer. Says whether widths and opacities have samples; if they have, the values
+/// beside them are the layer's.
+fn verify_samples(file: &mut CrateFile, prim: FileNode, facts: &ShotFacts, layer: &HairLayer) -> Result<[bool; 2]> {
     let times: Vec<f64> = facts.frames.iter().map(|&f| f64::from(f)).collect();
-    let points = layer.offsets.total() as u64;
-    for (name, kind, len) in
-        [("points", Type::Vec3f, points), ("velocities", Type::Vec3f, points), ("extent", Type::Vec3f, 2)]
-    {
+    let (curves, points) = (layer.offsets.len() as u64, layer.offsets.total() as u64);
+    let columns = [("widths", &layer.width), ("primvars:displayOpacity", &layer.opacity)];
+    let mut moving = [false; 2];
+    for ((name, expected), moving) in columns.into_iter().zip(&mut moving) {
+        let Some(node) = file.attribute(prim, name) else { continue };
+        *moving = file.field(node, "timeSamples").is_some();
+        let still = file.field(node, "default").map(|rep| file.floats(rep, 1)).transpose()?;
+        if *moving && still.as_ref() != Some(expected) {
+            return Err(file.bad(format!("{name} differs from what was exported")));
+        }
+    }
+    let all = [
+        ("points", Type::Vec3f, points, true),
+        ("velocities", Type::Vec3f, points, true),
+        ("extent", Type::Vec3f, 2, true),
+        ("widths", Type::Float, points, moving[0]),
+        ("primvars:displayOpacity", Type::Float, curves, moving[1]),
+    ];
+    for (name, kind, len, _) in all.into_iter().filter(|column| column.3) {
         let samples = file.attribute(prim, name).and_then(|a| file.field(a, "timeSamples"));
         let samples = samples.ok_or_else(|| file.bad(format!("has no samples of {name}")))?;
         let (found, values) = file.samples(samples)?;
@@ -281,11 +338,17 @@ fn verify_samples(file: &mut CrateFile, prim: FileNode, facts: &ShotFacts, layer
             }
         }
     }
-    Ok(())
+    Ok(moving)
 }
 
-/// What was read against what was to be written; `Err` says what differs.
-fn verify_layer(read: &UsdCurves, facts: &ShotFacts, layer: &HairLayer) -> std::result::Result<(), String> {
+/// What was read at a frame against what was to be written; `Err` says what differs. `moving` says whether widths and
+/// opacities are the frame's own.
+fn verify_layer(
+    read: &UsdCurves,
+    facts: &ShotFacts,
+    layer: &HairLayer,
+    moving: [bool; 2],
+) -> std::result::Result<(), String> {
     let range = [facts.frames.first(), facts.frames.last()].map(|f| f64::from(f.copied().unwrap_or(0)));
     let trio = [read.kind.as_str(), read.basis.as_str(), read.wrap.as_str()];
     let same = [
@@ -302,9 +365,12 @@ fn verify_layer(read: &UsdCurves, facts: &ShotFacts, layer: &HairLayer) -> std::
         ("skinprim", read.skin_face == layer.skin_face),
         ("skinprimuv", read.skin_bary == layer.skin_bary),
         ("rest", read.rest == layer.rest),
-        ("widths", read.width == layer.width),
+        ("widths", if moving[0] { read.width.iter().all(|w| is_width(*w)) } else { read.width == layer.width }),
         ("displayColor", read.color == layer.color),
-        ("displayOpacity", read.opacity == layer.opacity),
+        (
+            "displayOpacity",
+            if moving[1] { read.opacity.iter().all(|x| x.is_finite()) } else { read.opacity == layer.opacity },
+        ),
         ("the number of points", read.points.len() == layer.offsets.total()),
         ("the number of velocities", read.velocity.len() == layer.offsets.total()),
     ];
@@ -324,7 +390,7 @@ fn verify_extent(file: &mut CrateFile, prim: FileNode, frame: i32, read: &UsdCur
     let (times, values) = file.samples(samples)?;
     let found = times.iter().position(|&t| t == f64::from(frame)).map(|i| values[i]);
     let extent = file.floats(found.ok_or_else(|| file.bad("has no extent at this frame"))?, 3)?;
-    let pad = read.width.iter().copied().fold(0.0, f32::max) / 2.0;
+    let pad = half_widest(&read.width);
     let holds = Bounds::of(&read.points).is_some_and(|b| {
         let [min, max] = b.padded(pad);
         extent.len() == 6 && (0..3).all(|k| extent[k] <= min[k] && extent[k + 3] >= max[k])
@@ -333,157 +399,4 @@ fn verify_extent(file: &mut CrateFile, prim: FileNode, frame: i32, read: &UsdCur
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::format::check::samples;
-
-    /// Writes the sample shot; returns its bytes.
-    fn write(path: &Path, facts: &ShotFacts, layers: &[HairLayer]) -> Vec<u8> {
-        let mut out = UsdHair::create(path, facts, layers).unwrap();
-        for &frame in &facts.frames {
-            let data: Vec<_> = layers.iter().map(|l| samples::frame(l, frame)).collect();
-            let data: Vec<_> = data.iter().map(|(p, v)| HairFrame { position: p, velocity: v }).collect();
-            out.write_frame(frame, &data).unwrap();
-        }
-        out.finish().unwrap();
-        std::fs::read(path).unwrap()
-    }
-
-    fn check_curves(curves: &[UsdCurves], facts: &ShotFacts, layers: &[HairLayer], frame: i32) {
-        assert_eq!(curves.len(), layers.len());
-        for (read, layer) in curves.iter().zip(layers) {
-            verify_layer(read, facts, layer).unwrap();
-            let (position, velocity) = samples::frame(layer, frame);
-            assert_eq!((&read.points, &read.velocity), (&position, &velocity));
-            assert_eq!(read.notes, Vec::<String>::new());
-        }
-    }
-
-    #[test]
-    fn what_is_written_is_read_back() {
-        let dir = tempfile::tempdir().unwrap();
-        let (facts, layers) = samples::shot();
-        let path = dir.path().join("a.usdc");
-        let bytes = write(&path, &facts, &layers);
-        verify(&path, &facts, &layers).unwrap();
-        for &frame in &facts.frames {
-            check_curves(&read_curves(&path, Some(f64::from(frame))).unwrap(), &facts, &layers, frame);
-        }
-        check_curves(&read_curves(&path, None).unwrap(), &facts, &layers, facts.frames[0]);
-        let curves = read_curves(&path, Some(5000.0)).unwrap();
-        check_curves(&curves, &facts, &layers, facts.frames[2]);
-        assert_eq!(curves[0].path, "/Hair/over_coat");
-        assert_eq!(curves[1].path, "/Hair/_2nd");
-        // Between two frames, points are halfway.
-        let between = read_curves(&path, Some(1001.5)).unwrap();
-        let (a, b) = (samples::frame(&layers[0], 1001).0, samples::frame(&layers[0], 1002).0);
-        for (k, p) in between[0].points.iter().enumerate() {
-            assert!((0..3).all(|i| (p[i] - 0.5 * (a[k][i] + b[k][i])).abs() < 1e-6));
-        }
-        // The same shot gives the same bytes.
-        assert_eq!(bytes, write(&dir.path().join("b.usdc"), &facts, &layers));
-    }
-
-    #[test]
-    fn names_become_valid_and_different() {
-        let names = ["a b", "a_b", "é", "", "9", "a:b"];
-        assert_eq!(identifiers(names.into_iter()), ["a_b", "a_b_2", "_", "__2", "_9", "a_b_3"]);
-    }
-
-    #[test]
-    fn an_empty_layer_and_no_layers_are_files_too() {
-        let dir = tempfile::tempdir().unwrap();
-        let (facts, mut layers) = samples::shot();
-        layers[0] = HairLayer { name: "bald".into(), ..HairLayer::default() };
-        let path = dir.path().join("a.usdc");
-        write(&path, &facts, &layers);
-        verify(&path, &facts, &layers).unwrap();
-        write(&path, &facts, &[]);
-        verify(&path, &facts, &[]).unwrap();
-        assert!(read_curves(&path, None).unwrap_err().to_string().contains("no BasisCurves"));
-    }
-
-    #[test]
-    fn verify_finds_what_differs() {
-        let dir = tempfile::tempdir().unwrap();
-        let (facts, layers) = samples::shot();
-        let path = dir.path().join("a.usdc");
-        write(&path, &facts, &layers);
-        let mut other = layers.clone();
-        other[1].id[0] += 1;
-        assert!(verify(&path, &facts, &other).unwrap_err().to_string().contains("hairId"));
-        let mut other = layers.clone();
-        other[0].width.iter_mut().for_each(|w| *w *= 2.0);
-        assert!(verify(&path, &facts, &other).unwrap_err().to_string().contains("widths"));
-        let other = ShotFacts { meters_per_unit: 1.0, ..facts.clone() };
-        assert!(verify(&path, &other, &layers).unwrap_err().to_string().contains("metersPerUnit"));
-        let other = ShotFacts { frames: vec![1001, 1002], ..facts.clone() };
-        assert!(verify(&path, &other, &layers).is_err());
-        assert!(verify(&path, &facts, &layers[..1]).is_err());
-    }
-
-    #[test]
-    fn an_unfinished_file_does_not_open() {
-        let dir = tempfile::tempdir().unwrap();
-        let (facts, layers) = samples::shot();
-        let path = dir.path().join("a.usdc");
-        let mut out = UsdHair::create(&path, &facts, &layers).unwrap();
-        let data: Vec<_> = layers.iter().map(|l| samples::frame(l, 1001)).collect();
-        let data: Vec<_> = data.iter().map(|(p, v)| HairFrame { position: p, velocity: v }).collect();
-        assert!(out.write_frame(1002, &data).unwrap_err().to_string().contains("out of order"));
-        out.write_frame(1001, &data).unwrap();
-        let error = out.finish().unwrap_err().to_string();
-        assert!(error.contains("1 of 3 frames") && error.contains("frame 1002"), "{error}");
-        assert!(read_curves(&path, None).is_err());
-    }
-
-    /// Neither a changed byte nor a lost end may panic, hang or pass for a whole file with other tables.
-    #[test]
-    fn broken_files_are_errors() {
-        let dir = tempfile::tempdir().unwrap();
-        let (facts, mut layers) = samples::shot();
-        layers.truncate(1);
-        let path = dir.path().join("a.usdc");
-        let bytes = write(&path, &facts, &layers);
-        let broken = dir.path().join("broken.usdc");
-        for n in (0..bytes.len()).step_by(7).chain(bytes.len() - 40..bytes.len()) {
-            std::fs::write(&broken, &bytes[..n]).unwrap();
-            assert!(read_curves(&broken, Some(1002.0)).is_err(), "the first {n} bytes were read as a file");
-        }
-        let mut read = 0;
-        for i in (0..bytes.len()).step_by(2) {
-            let mut bad = bytes.clone();
-            bad[i] ^= [0x01, 0x80, 0xff, 0x10][i / 2 % 4];
-            std::fs::write(&broken, &bad).unwrap();
-            if let Ok(curves) = read_curves(&broken, Some(1002.0)) {
-                read += 1;
-                for c in &curves {
-                    assert_eq!(c.points.len(), c.offsets.total());
-                    assert!(c.id.is_empty() || c.id.len() == c.offsets.len());
-                }
-            }
-            if i % 10 == 0 {
-                let _ = verify(&broken, &facts, &layers);
-            }
-        }
-        assert!(read > 0);
-    }
-
-    #[test]
-    fn other_files_are_refused_with_advice() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("a.usd");
-        for (content, word) in
-            [(&b"#usda 1.0\n"[..], ".usda"), (b"PK\x03\x04", ".usdz"), (b"ply\n", "PXR-USDC"), (b"", "PXR-USDC")]
-        {
-            std::fs::write(&path, content).unwrap();
-            let error = read_curves(&path, None).unwrap_err();
-            assert!(error.what.contains(word) && !error.hint.is_empty(), "{error}");
-        }
-        let mut newer = [0u8; 200];
-        newer[..10].copy_from_slice(b"PXR-USDC\0\x63");
-        std::fs::write(&path, newer).unwrap();
-        assert!(read_curves(&path, None).unwrap_err().what.contains("0.99"));
-        assert!(read_curves(&dir.path().join("none.usdc"), None).is_err());
-    }
-}
+mod tests;

@@ -33,13 +33,14 @@ fn what_is_written_is_read() {
     let position: Vec<[f32; 3]> = (0..9).map(|k| [k as f32 * 0.3, 1.0 / 3.0, -7.0]).collect();
     let velocity = [[1.0, 2.0, 3.0]; 9];
     let frame = [
-        HairFrame { position: &position[..5], velocity: &velocity[..5] },
-        HairFrame { position: &position[5..], velocity: &velocity[5..] },
+        HairFrame { position: &position[..5], velocity: &velocity[..5], ..HairFrame::default() },
+        HairFrame { position: &position[5..], velocity: &velocity[5..], ..HairFrame::default() },
     ];
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("hair.ply");
     for origin in [[0.0; 3], [1e6, -2e5, 0.25]] {
         write_hair(&path, &facts(origin), &layers, &frame).unwrap();
+        verify_hair(&path, &facts(origin), &layers, &frame).unwrap();
         let c = read_curves(&path).unwrap();
         assert_eq!(c.strands.origin, origin);
         assert_eq!(c.strands.offsets, Offsets::from_counts([3, 2, 4]));
@@ -51,7 +52,7 @@ fn what_is_written_is_read() {
         assert!(worst.fold(0.0, f32::max) <= if origin[0] == 0.0 { 0.0 } else { 1e-9 });
     }
     // The file is an ordinary PLY: any reader sees velocities, colours, layers.
-    let tables = crate::format::ply::read_tables(&path).unwrap();
+    let tables = read_tables(&path).unwrap();
     let hair = tables.get("hair").unwrap();
     assert_eq!(hair.u32("layer").unwrap(), [0, 0, 1]);
     assert_eq!(hair.f32("r").unwrap(), [1.0, 1.0, 0.5]);
@@ -59,6 +60,46 @@ fn what_is_written_is_read() {
     let short = [frame[0], HairFrame { position: &position[..1], ..frame[1] }];
     let e = write_hair(&path, &facts([0.0; 3]), &layers, &short).unwrap_err().to_string();
     assert!(e.contains("layer 'beard': 1 values of position, expected 4"), "{e}");
+}
+
+#[test]
+fn colours_of_points_and_columns_of_frames_are_written() {
+    let per_point: Vec<[f32; 3]> = (0..5).map(|k| [0.1 * k as f32, 0.5, 0.25]).collect();
+    let layers = [
+        HairLayer { color: per_point.clone(), ..layer("coat", &[3, 2], 1) },
+        HairLayer { color: vec![[0.0, 0.5, 1.0]], opacity: vec![0.75], ..layer("beard", &[4], 9) },
+        layer("down", &[2], 20),
+    ];
+    let points = [[0.5; 3]; 11];
+    let of = |n: std::ops::Range<usize>| HairFrame {
+        position: &points[n.clone()],
+        velocity: &points[n],
+        ..HairFrame::default()
+    };
+    let mut frame = [of(0..5), of(5..9), of(9..11)];
+    frame[1].width = &[4.0, 3.0, 2.0, 1.0];
+    frame[0].opacity = &[0.25, 0.5];
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hair.ply");
+    let facts = facts([0.0; 3]);
+    write_hair(&path, &facts, &layers, &frame).unwrap();
+    verify_hair(&path, &facts, &layers, &frame).unwrap();
+    let tables = read_tables(&path).unwrap();
+    let (vertex, hair) = (tables.get("vertex").unwrap(), tables.get("hair").unwrap());
+    assert_eq!(vertex.f32("r").unwrap(), [0.0, 0.1, 0.2, 0.3, 0.4, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0].map(|x: f32| x));
+    assert_eq!(vertex.f32("b").unwrap(), [[0.25; 5].as_slice(), &[1.0; 6]].concat());
+    assert_eq!(vertex.f32("width").unwrap(), [&layers[0].width, frame[1].width, &layers[2].width].concat());
+    assert_eq!(hair.f32("opacity").unwrap(), [0.25, 0.5, 0.75, 1.0]);
+    assert!(hair.column("r").is_none());
+    assert_eq!(read_curves(&path).unwrap().width.unwrap(), vertex.f32("width").unwrap());
+    // What differs is named.
+    let e = verify_hair(&path, &facts, &layers, &[of(0..5), frame[1], frame[2]]).unwrap_err().to_string();
+    assert!(e.contains("(element hair): opacity differs"), "{e}");
+    let e = verify_hair(&path, &facts, &layers, &[frame[0], of(5..9), frame[2]]).unwrap_err().to_string();
+    assert!(e.contains("(element vertex): width differs"), "{e}");
+    frame[1].width = &[1.0];
+    let e = write_hair(&path, &facts, &layers, &frame).unwrap_err().to_string();
+    assert!(e.contains("layer 'beard': 1 values of width of the frame, expected 4"), "{e}");
 }
 
 fn five() -> Element {
