@@ -1,6 +1,7 @@
 //! Hair without time: control hairs placed and combed, hairs instanced from maps, weights, interpolation.
 
 mod area_curve;
+pub mod areas;
 mod box_tree;
 pub mod candidates;
 mod chart_cut;
