@@ -9,3 +9,4 @@ mod reference;
 mod rows;
 mod samples;
 mod simulate;
+mod watch;

@@ -2,6 +2,7 @@
 
 pub mod along;
 mod area_curve;
+pub mod areas;
 mod box_tree;
 pub mod candidates;
 mod chart_cut;

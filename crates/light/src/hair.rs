@@ -1,9 +1,10 @@
 //! Strands to shaded points in the picture: smoothed, cut to pieces that are short on the screen, clipped.
 
-use crate::preview::{HairView, Lighting, in_layer};
+use crate::preview::{HairView, Lighting, Region, in_layer};
 use crate::raster::{Point, REACH, TILE};
 use crate::slab::HUGE;
 use crate::{V3, View};
+use std::ops::Range;
 
 /// Longest piece, pixels at its depth. Pieces are what is sorted by depth and what colours run over: longer ones cross
 /// in the wrong order and miss highlights, shorter ones cost time.
@@ -24,30 +25,53 @@ const MERGE: f32 = 0.8;
 /// Part of the picture's size that lines may reach beyond its border before they are cut there.
 const GUARD: f32 = 0.5;
 
-/// Picture size in tiles.
+/// Picture size in tiles, and which of them are drawn.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tiling {
     pub width: usize,
     pub height: usize,
     pub across: usize,
-    pub down: usize,
+    /// First and one past the last tile that is drawn, across and down.
+    pub drawn: [[usize; 2]; 2],
 }
 
 impl Tiling {
-    pub fn new(width: usize, height: usize) -> Tiling {
-        Tiling { width, height, across: width.div_ceil(TILE), down: height.div_ceil(TILE) }
+    /// The tiles that `region` touches; it lies in the picture and is not empty.
+    pub fn new(width: usize, height: usize, region: &Region) -> Tiling {
+        let tiles = |r: &Range<usize>| [r.start / TILE, r.end.div_ceil(TILE)];
+        let drawn = [tiles(&region.x), tiles(&region.y)];
+        Tiling { width, height, across: width.div_ceil(TILE), drawn }
     }
 
-    /// Calls `each` with the number of every tile that a box of pixel coordinates touches.
+    /// Number of tiles of the picture, drawn or not.
+    pub fn count(&self) -> usize {
+        self.across * self.height.div_ceil(TILE)
+    }
+
+    /// True if a tile is drawn.
+    pub fn is_drawn(&self, tile: usize) -> bool {
+        let at = [tile % self.across, tile / self.across];
+        (0..2).all(|i| (self.drawn[i][0]..self.drawn[i][1]).contains(&at[i]))
+    }
+
+    /// First and one past the last pixel of the tiles that are drawn, along an axis.
+    fn pixels(&self, axis: usize) -> [usize; 2] {
+        let [first, end] = self.drawn[axis];
+        [first * TILE, (end * TILE).min([self.width, self.height][axis])]
+    }
+
+    /// Calls `each` with the number of every drawn tile that a box of pixel coordinates touches.
     pub fn touched(&self, low: [f32; 2], high: [f32; 2], mut each: impl FnMut(u32)) {
-        let range = |i: usize, size: usize, tiles: usize| {
-            if !(high[i] >= 0.0 && low[i] <= size as f32) {
+        let range = |i: usize| {
+            let [first, end] = self.drawn[i];
+            if !(high[i] >= 0.0 && low[i] <= [self.width, self.height][i] as f32) {
                 return 0..0;
             }
-            (low[i].max(0.0) as usize / TILE)..((high[i] as usize / TILE).saturating_add(1)).min(tiles)
+            let to = ((high[i] as usize / TILE).saturating_add(1)).min(end);
+            (low[i].max(0.0) as usize / TILE).max(first)..to
         };
-        for j in range(1, self.height, self.down) {
-            for i in range(0, self.width, self.across) {
+        for j in range(1) {
+            for i in range(0) {
                 each((j * self.across + i) as u32);
             }
         }
@@ -216,9 +240,15 @@ impl Draw<'_> {
         Point { x: at(p.x, 0), y: at(p.y, 1), width, ..*p }
     }
 
-    /// False if a whole run is in front of the near plane or beyond one border of the picture, curves included.
+    /// False if a whole run is in front of the near plane or beyond one border of the tiles that are drawn, curves
+    /// included.
     fn visible(&self, knot: &[Knot]) -> bool {
-        let half = [self.view.centre[0] as f32, self.view.centre[1] as f32];
+        // From the view axis to the right and the left, the lower and the upper border, pixels.
+        let side = |i: usize| {
+            let ([low, high], centre) = (self.tiling.pixels(i), self.view.centre[i]);
+            [(high as f64 - centre) as f32, (centre - low as f64) as f32]
+        };
+        let side = [side(0), side(1)];
         let focal = self.view.focal as f32;
         // Smoothed curves stay within a third of the longest span of their knots.
         let reach = knot.windows(2).fold(0.0f32, |m, w| m.max((w[1].p - w[0].p).norm())) * 0.34;
@@ -226,15 +256,13 @@ impl Draw<'_> {
         for k in knot {
             let r = reach + k.width;
             beyond[4] &= k.p.z + r < self.view.near as f32;
-            for i in 0..2 {
+            for (e, beyond) in beyond[..4].iter_mut().enumerate() {
+                let (i, sign) = (e / 2, if e % 2 == 0 { 1.0 } else { -1.0 });
+                let slope = (side[i][e % 2] + REACH) / focal;
                 // Distance from the border, times its slope: scene units.
-                let (border, rim) = if self.view.parallel {
-                    ((half[i] + REACH) / focal, r)
-                } else {
-                    ((half[i] + REACH) / focal * k.p.z, r * (1.0 + (half[i] + REACH) / focal))
-                };
-                beyond[2 * i] &= k.p[i] > border + rim;
-                beyond[2 * i + 1] &= -k.p[i] > border + rim;
+                let (border, rim) =
+                    if self.view.parallel { (slope, r) } else { (slope * k.p.z, r * (1.0 + slope.abs())) };
+                *beyond &= sign * k.p[i] > border + rim;
             }
         }
         beyond == [false; 5]

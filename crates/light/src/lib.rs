@@ -15,7 +15,7 @@ mod slab;
 
 pub use camera::{Camera, View};
 pub use image::{Image, contact_sheet};
-pub use preview::{HairView, RenderCounts, Scene, Settings, SkinView, render};
+pub use preview::{HairView, Region, RenderCounts, Scene, Settings, SkinView, render, render_region};
 pub use shade::{HairShade, Light, studio_lights};
 
 /// A point or direction in camera space, single precision: relative to the eye, so exact near it.

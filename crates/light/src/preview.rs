@@ -224,6 +224,15 @@ impl Lighting {
     }
 }
 
+/// Pixels of a picture: columns and rows.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Region {
+    /// Columns, from the left.
+    pub x: Range<usize>,
+    /// Rows, from the top.
+    pub y: Range<usize>,
+}
+
 /// Draws a scene. The same bytes for any number of threads. Bad input is passed over and counted, never an error; a
 /// picture without pixels is an empty image.
 pub fn render(
@@ -233,28 +242,43 @@ pub fn render(
     height: usize,
     settings: &Settings,
 ) -> (Image, RenderCounts) {
+    render_region(scene, camera, [width, height], &Region { x: 0..width, y: 0..height }, settings)
+}
+
+/// Draws a region of the picture of `size` (width, height) that [`render`] draws: the same pixels, byte for byte. What
+/// lies outside the picture is left off. Shadows are those of the whole scene; lines are drawn for the region only.
+pub fn render_region(
+    scene: &Scene,
+    camera: &Camera,
+    [width, height]: [usize; 2],
+    region: &Region,
+    settings: &Settings,
+) -> (Image, RenderCounts) {
     let mut counts = RenderCounts { hairs: scene.layers.iter().map(|l| l.offsets.len()).sum(), ..Default::default() };
-    if width == 0 || height == 0 {
-        return (Image { width, height, rgb: Vec::new() }, counts);
+    let within = |r: &Range<usize>, size: usize| r.start.min(size)..r.end.min(size);
+    let region = Region { x: within(&region.x, width), y: within(&region.y, height) };
+    if region.x.is_empty() || region.y.is_empty() {
+        return (Image { width: region.x.len(), height: region.y.len(), rgb: Vec::new() }, counts);
     }
     let view = camera.view(width, height);
-    let tiling = Tiling::new(width, height);
+    let tiling = Tiling::new(width, height, &region);
     let lighting = Lighting::new(scene, camera, &view, settings);
     let (facets, facet_bins) = facets(scene, &view, &tiling, &mut counts);
     let draw = Draw { view: &view, lighting: &lighting, tiling };
     let (points, opacity, mut lines) = lines(scene, &draw, &mut counts);
     let filter = Filter::new();
-    let tiles = tiling.across * tiling.down;
+    let tiles = tiling.count();
     let mut rest = lines.1.as_mut_slice();
     let mut jobs = Vec::with_capacity(tiles);
     for t in 0..tiles {
         let (own, after) = std::mem::take(&mut rest).split_at_mut(lines.0[t + 1] - lines.0[t]);
-        jobs.push(own);
+        if tiling.is_drawn(t) {
+            jobs.push((t, own));
+        }
         rest = after;
     }
     let drawn: Vec<Vec<[f32; 3]>> = jobs
         .into_par_iter()
-        .enumerate()
         .map(|(t, order)| {
             let (x, y) = (t % tiling.across * TILE, t / tiling.across * TILE);
             let mut tile = Tile::new(x, y, TILE.min(width - x), TILE.min(height - y));
@@ -276,16 +300,21 @@ pub fn render(
             })
         })
         .collect();
-    (assemble(&drawn, &tiling), counts)
+    (assemble(&drawn, &tiling, &region), counts)
 }
 
-/// Puts tiles together.
-fn assemble(drawn: &[Vec<[f32; 3]>], tiling: &Tiling) -> Image {
-    let mut image = Image::filled(tiling.width, tiling.height, [0.0; 3]);
-    image.rgb.par_chunks_mut(tiling.width).enumerate().for_each(|(y, row)| {
-        for (i, part) in row.chunks_mut(TILE).enumerate() {
-            let start = y % TILE * part.len();
-            part.copy_from_slice(&drawn[y / TILE * tiling.across + i][start..start + part.len()]);
+/// Puts the region together from the drawn tiles.
+fn assemble(drawn: &[Vec<[f32; 3]>], tiling: &Tiling, region: &Region) -> Image {
+    let mut image = Image::filled(region.x.len(), region.y.len(), [0.0; 3]);
+    let [[left, right], [top, _]] = tiling.drawn;
+    image.rgb.par_chunks_mut(region.x.len()).zip(region.y.clone()).for_each(|(row, y)| {
+        for i in left..right {
+            let x0 = i * TILE;
+            let x1 = (x0 + TILE).min(tiling.width);
+            let (from, to) = (x0.max(region.x.start), x1.min(region.x.end));
+            let tile = &drawn[(y / TILE - top) * (right - left) + i - left];
+            let start = y % TILE * (x1 - x0) + from - x0;
+            row[from - region.x.start..to - region.x.start].copy_from_slice(&tile[start..start + to - from]);
         }
     });
     image
@@ -344,7 +373,7 @@ fn lines(scene: &Scene, draw: &Draw, counts: &mut RenderCounts) -> (Vec<Point>, 
             (tile, u64::from(z.to_bits()) << 32 | u64::from(start + i))
         })
     });
-    let bins = bin(draw.tiling.across * draw.tiling.down, keys);
+    let bins = bin(draw.tiling.count(), keys);
     (points, opacity, bins)
 }
 
@@ -371,7 +400,7 @@ fn facets(scene: &Scene, view: &View, tiling: &Tiling, counts: &mut RenderCounts
             tiling.touched(low, high, |tile| pairs.push((tile, index)));
         }
     }
-    let bins = bin(tiling.across * tiling.down, pairs.iter().copied());
+    let bins = bin(tiling.count(), pairs.iter().copied());
     (facets, bins)
 }
 

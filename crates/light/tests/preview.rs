@@ -186,6 +186,46 @@ fn the_same_bytes_for_any_number_of_threads() {
 }
 
 #[test]
+fn a_region_has_the_pixels_of_the_whole_picture() {
+    let hairs = tuft(1500);
+    let offsets = Offsets::from_counts(hairs.counts.iter().copied());
+    let layer = HairView {
+        offsets: &offsets,
+        position: &hairs.position,
+        origin: [0.0; 3],
+        width: &hairs.width,
+        color: &hairs.color,
+        opacity: &hairs.opacity,
+        root_normal: &[],
+    };
+    let (position, triangle) = square(35.0, 0.0);
+    let skin = SkinView { position: &position, triangle: &triangle, normal: &[], color: [0.6, 0.5, 0.4] };
+    for camera in [flat_camera(), Camera { parallel_height: None, fov_y_deg: 50.0, ..flat_camera() }] {
+        let lights = studio_lights(&camera);
+        let scene = Scene { skin: Some(skin), layers: &[layer], lights: &lights, background: [0.1; 3] };
+        let size = [300, 250];
+        let (whole, all) = render(&scene, &camera, size[0], size[1], &Settings::default());
+        let regions = [[0, 300, 0, 250], [0, 1, 0, 1], [64, 128, 64, 128], [70, 71, 30, 249], [211, 300, 190, 250]];
+        for [x0, x1, y0, y1] in regions.into_iter().chain([[120, 190, 100, 150]]) {
+            let region = Region { x: x0..x1, y: y0..y1 };
+            let (part, counts) = render_region(&scene, &camera, size, &region, &Settings::default());
+            assert_eq!((part.width, part.height), (x1 - x0, y1 - y0));
+            for (row, y) in part.rgb.chunks(part.width).zip(y0..) {
+                assert_eq!(row, &whole.rgb[y * size[0] + x0..y * size[0] + x1], "row {y} of {region:?}");
+            }
+            assert!(counts.hairs == all.hairs && counts.pieces <= all.pieces);
+            assert!(x1 - x0 > 64 || counts.pieces < all.pieces / 2, "{region:?}: {} pieces", counts.pieces);
+        }
+        // What lies outside is left off; what holds no pixel is empty.
+        let beyond = Region { x: 290..900, y: 0..9000 };
+        let part = render_region(&scene, &camera, size, &beyond, &Settings::default()).0;
+        assert_eq!((part.width, part.height, part.rgb[0]), (10, 250, whole.rgb[290]));
+        let nothing = Region { x: 400..500, y: 0..10 };
+        assert!(render_region(&scene, &camera, size, &nothing, &Settings::default()).0.rgb.is_empty());
+    }
+}
+
+#[test]
 fn skin_hides_hair_behind_it_only() {
     let (position, triangle) = square(30.0, 0.0);
     let skin = SkinView { position: &position, triangle: &triangle, normal: &[], color: [0.3, 0.5, 0.2] };

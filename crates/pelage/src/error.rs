@@ -21,6 +21,9 @@ pub enum Error {
         /// What the user can do; empty if there is nothing to add.
         hint: String,
     },
+    /// Work was given up because something newer is to be done.
+    #[error("stopped")]
+    Stopped,
     /// The disk failed while running.
     #[error("{}: {source}", path.display())]
     Disk {
@@ -52,7 +55,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Config(_) | Error::Format(_) | Error::Input { .. } => 2,
-            Error::Disk { .. } => 1,
+            Error::Disk { .. } | Error::Stopped => 1,
         }
     }
 
@@ -75,7 +78,7 @@ impl Error {
             }
             Error::Format(e) => format!("error: {e}{}", with(&e.hint)),
             Error::Input { what, hint } => format!("error: {what}{}", with(hint)),
-            Error::Disk { .. } => format!("error: {self}"),
+            Error::Disk { .. } | Error::Stopped => format!("error: {self}"),
         }
     }
 }

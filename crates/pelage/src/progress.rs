@@ -2,6 +2,8 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Progress of one stage at a time.
@@ -15,6 +17,7 @@ pub struct Progress {
     done: u64,
     started: Instant,
     said: Instant,
+    stop: Arc<AtomicBool>,
 }
 
 impl Progress {
@@ -22,7 +25,18 @@ impl Progress {
     pub fn new(quiet: bool) -> Self {
         let now = Instant::now();
         let terminal = std::io::stderr().is_terminal();
-        Progress { terminal, quiet, bar: None, stage: String::new(), total: 0, done: 0, started: now, said: now }
+        let stop = Arc::default();
+        Progress { terminal, quiet, bar: None, stage: String::new(), total: 0, done: 0, started: now, said: now, stop }
+    }
+
+    /// The same, of work that ends with [`crate::Error::Stopped`] soon after `stop` is set.
+    pub fn stoppable(quiet: bool, stop: Arc<AtomicBool>) -> Self {
+        Progress { stop, ..Progress::new(quiet) }
+    }
+
+    /// True if the work is to stop.
+    pub fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
     }
 
     /// Starts a stage of `total` steps.
@@ -72,14 +86,15 @@ impl Progress {
         self.say(&format!("{:<12} {line}", self.stage));
     }
 
-    /// Shows the fraction done of something that takes long, on a terminal; it may be called from any thread. Always true.
+    /// Shows the fraction done of something that takes long, on a terminal; it may be called from any thread. False
+    /// as soon as the work is to stop.
     pub fn ticker(&self, what: &str) -> impl Fn(f64) -> bool + Sync + use<> {
-        let (bar, what) = (self.bar.clone(), what.to_owned());
+        let (bar, what, stop) = (self.bar.clone(), what.to_owned(), self.stop.clone());
         move |done| {
             if let Some(bar) = bar.as_ref().filter(|_| done < 1.0) {
                 bar.set_message(format!("{what} {:.0} %", 100.0 * done));
             }
-            true
+            !stop.load(Ordering::Relaxed)
         }
     }
 

@@ -91,7 +91,7 @@ pub struct BodyFile {
 }
 
 /// A shot with its input files.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Project {
     /// The shot file.
     pub shot: Document<ShotFile>,
@@ -170,6 +170,26 @@ impl Project {
         }
         hashes.save();
         Ok(Project { shot, groom, rest, curves, bodies, drawn, frames, before, motion, particles, maps })
+    }
+
+    /// The same shot with `percent` of its hairs, in (0, 100]: a smaller density keeps the first of the candidates, so each
+    /// of these hairs is one of the shot's, and as even over the skin. Hair from a curves file stays as it is.
+    pub fn thinned(&self, percent: f64) -> Project {
+        let mut out = self.clone();
+        for layer in &mut out.groom.value.layer {
+            layer.density.value *= percent / 100.0;
+        }
+        out
+    }
+
+    /// Every input file but the shot and the groom file.
+    pub fn inputs(&self) -> Vec<&InputFile> {
+        let skins = self.frames.values().chain(self.before.values());
+        let skins = skins.filter_map(|at| if let SkinAt::File(file) = at { Some(file) } else { None });
+        let motions = self.bodies.iter().map(|b| &b.motion).chain([&self.motion]).flatten().map(|m| &m.file);
+        let single = [&self.rest, &self.curves, &self.drawn].into_iter().flatten();
+        let maps = self.maps.values().flatten().map(|(_, file)| file);
+        single.chain(skins).chain(self.bodies.iter().map(|b| &b.file)).chain(motions).chain(maps).collect()
     }
 
     /// Folder of the shot's outputs.

@@ -4,7 +4,9 @@ mod cache;
 mod compare;
 mod init;
 mod inspect;
+mod preview;
 mod run;
+mod watch;
 
 use crate::Error;
 use crate::stage::Stage;
@@ -41,8 +43,8 @@ pub enum Command {
     Run(RunArguments),
     /// Say what would run, and why; run nothing
     Plan(RunArguments),
-    /// Make the pictures: a still and a contact sheet
-    Preview(RunArguments),
+    /// Make the pictures: a still and a contact sheet, or part of a still; --watch draws it again after every edit
+    Preview(PreviewArguments),
     /// Say what is in a file: counts, bounds, units, ids, warnings
     Inspect {
         /// A skin, curves, map, cache entry or motion
@@ -103,6 +105,28 @@ pub struct RunArguments {
     #[arg(long, short)]
     pub quiet: bool,
 }
+
+/// Arguments of `pelage preview`.
+#[derive(Debug, clap::Args)]
+pub struct PreviewArguments {
+    /// Those that all commands on a shot share.
+    #[command(flatten)]
+    pub run: RunArguments,
+    /// Draw the still again whenever an input changes, with few hairs first; Ctrl-C ends it
+    #[arg(long, conflicts_with_all = ["to", "frames", "force", "json"])]
+    pub watch: bool,
+    /// Only this percentage of the hairs, into preview-draft.png; with --watch those of the draft, 10 if not given, 100
+    /// for no draft
+    #[arg(long, value_name = "PERCENT", value_parser = parse_percent, conflicts_with_all = ["to", "frames"])]
+    pub hairs: Option<f64>,
+    /// Only a region of the still, into preview-crop.png: X0,Y0,X1,Y1 in fractions of the picture, from the upper left
+    #[arg(long, value_parser = parse_crop, allow_hyphen_values = true, conflicts_with_all = ["to", "frames"])]
+    pub crop: Option<Crop>,
+}
+
+/// A region of a picture: left, upper, right and lower border in [0, 1].
+#[derive(Clone, Copy, Debug)]
+pub struct Crop(pub [f64; 4]);
 
 /// A parsed list of frames.
 #[derive(Clone, Debug)]
@@ -167,6 +191,21 @@ fn parse_frames(text: &str) -> Result<Frames, String> {
     Ok(Frames(frames))
 }
 
+/// "10" -> 10, above 0 and at most 100.
+fn parse_percent(text: &str) -> Result<f64, String> {
+    let value = text.trim().trim_end_matches('%').parse().ok().filter(|x: &f64| *x > 0.0 && *x <= 100.0);
+    value.ok_or_else(|| format!("`{text}` is not a percentage above 0 and up to 100"))
+}
+
+/// "0.2,0,0.5,1" -> the region.
+fn parse_crop(text: &str) -> Result<Crop, String> {
+    let bad = || format!("`{text}` is not a region: write X0,Y0,X1,Y1 with 0 <= X0 < X1 <= 1 and 0 <= Y0 < Y1 <= 1");
+    let list: Option<Vec<f64>> = text.split(',').map(|x| x.trim().parse().ok()).collect();
+    let crop: [f64; 4] = list.and_then(|l| l.try_into().ok()).ok_or_else(bad)?;
+    let ordered = |i: usize| 0.0 <= crop[i] && crop[i] < crop[i + 2] && crop[i + 2] <= 1.0;
+    if ordered(0) && ordered(1) { Ok(Crop(crop)) } else { Err(bad()) }
+}
+
 /// Does what the arguments say; true if the exit code is 0.
 pub fn execute(arguments: Arguments) -> Result<bool, Error> {
     match arguments.command {
@@ -174,7 +213,7 @@ pub fn execute(arguments: Arguments) -> Result<bool, Error> {
             init::init(&dir, skin.as_deref(), meters_per_unit, sample)
         }
         Command::Run(a) => run::run(a, false),
-        Command::Preview(a) => run::run(a, true),
+        Command::Preview(a) => preview::preview(a),
         Command::Plan(a) => run::plan(a),
         Command::Inspect { file, json } => inspect::inspect(&file, json),
         Command::Compare { a, b, tolerance, json } => compare::compare(&a, &b, tolerance, json),
@@ -209,6 +248,16 @@ mod tests {
         for bad in ["", "a", "3-1", "1,,2", "1-", "1-99999999"] {
             assert!(frames(bad).is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn crops_and_percentages_are_checked() {
+        assert_eq!(parse_crop("0,0.25, 0.5,1").unwrap().0, [0.0, 0.25, 0.5, 1.0]);
+        for bad in ["", "0,0,1", "0,0,1,1,1", "0.5,0,0.5,1", "0,0.8,1,0.2", "-0.1,0,1,1", "0,0,1,1.01", "NaN,0,1,1"] {
+            assert!(parse_crop(bad).is_err(), "{bad}");
+        }
+        assert_eq!((parse_percent("2.5"), parse_percent("100%")), (Ok(2.5), Ok(100.0)));
+        assert!(["0", "-1", "100.1", "NaN", "inf", "ten", ""].iter().all(|bad| parse_percent(bad).is_err()));
     }
 
     #[test]

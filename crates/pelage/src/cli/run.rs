@@ -17,11 +17,12 @@ fn options(a: &RunArguments, sheet: bool) -> Options {
         force: a.force,
         without: sheet.then_some(Stage::Export),
         sheet,
+        draft: false,
     }
 }
 
 /// Sets the number of threads. Results do not depend on it.
-fn threads(jobs: Option<u16>) -> Result<(), Error> {
+pub(super) fn threads(jobs: Option<u16>) -> Result<(), Error> {
     let Some(jobs) = jobs else { return Ok(()) };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(jobs)).build_global();
     pool.map_err(|e| Error::input(format!("--jobs {jobs}: {e}"), "give fewer"))
@@ -40,17 +41,23 @@ pub fn run(a: RunArguments, sheet: bool) -> Result<bool, Error> {
     let mut runner = Runner::new(&project, options, &mut progress)?;
     let report = runner.run()?;
     drop(runner);
-    let out = project.out_dir();
-    if report.ran() > 0 {
-        std::fs::create_dir_all(&out).map_err(Error::disk(&out))?;
-        let path = out.join("report.json");
-        write_whole(&path, |f| f.write_all(report.json().as_bytes())).map_err(Error::disk(&path))?;
-    }
+    keep(&project, &report)?;
     for name in leftovers(&project) {
         progress.say(&format!("note: {name} in the output folder is of an earlier run: its format is not asked for"));
     }
     print(&if a.json { report.json() } else { summary(&report, &project) });
     Ok(true)
+}
+
+/// Writes the report of a run that did something beside its results.
+pub(super) fn keep(project: &Project, report: &Report) -> Result<(), Error> {
+    if report.ran() == 0 {
+        return Ok(());
+    }
+    let out = project.out_dir();
+    std::fs::create_dir_all(&out).map_err(Error::disk(&out))?;
+    let path = out.join("report.json");
+    write_whole(&path, |f| f.write_all(report.json().as_bytes())).map_err(Error::disk(&path))
 }
 
 /// Whole-shot files in the output folder that the shot does not ask for any more.

@@ -7,7 +7,10 @@ use crate::config::UpAxis;
 use crate::files::unfinished;
 use crate::format::{HairLayer, image::write_png};
 use pelage_geom::{Offsets, SurfacePoint};
-use pelage_light::{Camera, HairView, Image, Scene, Settings, SkinView, contact_sheet, render, studio_lights};
+use pelage_light::{
+    Camera, HairView, Image, Region, Scene, Settings, SkinView, contact_sheet, render_region, studio_lights,
+};
+use std::path::{Path, PathBuf};
 
 /// Linear grey of the background: dark enough for light hair, light enough for dark hair.
 const BACKGROUND: [f32; 3] = [0.16, 0.17, 0.19];
@@ -23,22 +26,66 @@ const FINER: u32 = 2;
 
 /// Draws the still.
 pub fn still(run: &mut Runner<'_>) -> Result<(), Error> {
-    let frame = run.project.still_frame();
-    let drawn = drawn(run)?;
-    let camera = camera(run, &drawn, &[frame])?;
-    let picture = draw(run, &drawn, &camera, frame, run.project.shot.value.preview.size)?;
+    let picture = seen(run, &Part::default())?;
     save(run, What::Still, "preview.png", &picture)
+}
+
+/// What is drawn of the still.
+#[derive(Clone, Copy, Debug)]
+pub struct Part {
+    /// Percentage of the hairs, in (0, 100], drawn as much wider as they are fewer. The run's project is the shot thinned
+    /// to it ([`crate::project::Project::thinned`]); of hair from a curves file, which that leaves whole, every n-th is
+    /// drawn.
+    pub hairs: f64,
+    /// Left, upper, right and lower border in [0, 1] of the picture's width and height.
+    pub crop: [f64; 4],
+}
+
+impl Default for Part {
+    fn default() -> Self {
+        Part { hairs: 100.0, crop: [0.0, 0.0, 1.0, 1.0] }
+    }
+}
+
+impl Part {
+    /// Pixels of a picture that the crop asks for, one at least.
+    pub fn region(&self, size: [u32; 2]) -> Region {
+        let range = |i: usize| {
+            let [from, to] = [self.crop[i], self.crop[i + 2]].map(|x| (x * f64::from(size[i])).round() as usize);
+            let from = from.min(size[i] as usize - 1);
+            from..to.max(from + 1)
+        };
+        Region { x: range(0), y: range(1) }
+    }
+}
+
+/// Draws a part of the still into a file of its own and returns its path. Nothing is kept that says so: the still itself
+/// counts as drawn only by [`still`].
+pub fn part(run: &mut Runner<'_>, part: &Part, name: &str) -> Result<PathBuf, Error> {
+    let picture = seen(run, part)?;
+    let path = run.project.out_dir().join(name);
+    let unfinished = write(&path, &picture)?;
+    std::fs::rename(&unfinished, &path).map_err(Error::disk(&path))?;
+    Ok(path)
+}
+
+fn seen(run: &mut Runner<'_>, part: &Part) -> Result<Image, Error> {
+    let (frame, size) = (run.project.still_frame(), run.project.shot.value.preview.size);
+    let drawn = drawn(run, part.hairs)?;
+    let camera = camera(run, &drawn, &[frame])?;
+    draw(run, &drawn, &camera, frame, size, &part.region(size))
 }
 
 /// Draws the contact sheet: frames evenly over the shot, each a third of the still's size, seen by one camera.
 pub fn sheet(run: &mut Runner<'_>) -> Result<(), Error> {
     let frames = run.project.sheet_frames();
-    let drawn = drawn(run)?;
+    let drawn = drawn(run, 100.0)?;
     let camera = camera(run, &drawn, &frames)?;
-    let size = run.project.shot.value.preview.size.map(|x| (x / 3).max(16));
+    let size = run.project.shot.value.preview.size.map(|x| (x / 3).max(16) * FINER);
+    let whole = Part::default().region(size);
     let mut pictures = Vec::new();
     for frame in &frames {
-        let mut picture = draw(run, &drawn, &camera, *frame, size.map(|x| x * FINER))?.shrunk(FINER as usize);
+        let mut picture = draw(run, &drawn, &camera, *frame, size, &whole)?.shrunk(FINER as usize);
         picture.draw_number(i64::from(*frame), (picture.width / 160).max(1));
         pictures.push(picture);
     }
@@ -52,25 +99,31 @@ struct Drawn {
     every: usize,
 }
 
-fn drawn(run: &mut Runner<'_>) -> Result<Drawn, Error> {
+/// Layers of a run whose project has `percent` of the shot's hairs.
+fn drawn(run: &mut Runner<'_>, percent: f64) -> Result<Drawn, Error> {
     let count = run.project.groom.value.layer.len();
     let mut hairs = 0;
     for i in 0..count {
         hairs += export::look(run, i)?.offsets.len();
     }
-    let every = hairs.div_ceil(DRAWN).max(1);
-    let layers = (0..count).map(|i| Ok(thinned(export::look(run, i)?, every))).collect::<Result<_, Error>>()?;
+    let fewer = 100.0 / percent;
+    // Curves are not thinned yet, grooms are.
+    let (least, wider) = if run.project.curves.is_some() { (fewer.round() as usize, 1.0) } else { (1, fewer as f32) };
+    let every = hairs.div_ceil(DRAWN).max(least).max(1);
+    let layer = |i| Ok(thinned(export::look(run, i)?, every, wider));
+    let layers = (0..count).map(layer).collect::<Result<_, Error>>()?;
     run.layers.clear();
     Ok(Drawn { layers, every })
 }
 
-/// Every n-th hair, n times as wide.
-fn thinned(layer: HairLayer, every: usize) -> HairLayer {
-    if every == 1 {
+/// Every n-th hair, n times as wide, and `wider` times that.
+fn thinned(layer: HairLayer, every: usize, wider: f32) -> HairLayer {
+    if every == 1 && wider == 1.0 {
         return layer;
     }
+    let wider = wider * every as f32;
     HairLayer {
-        width: nth(&layer.width, &layer.offsets, every).map(|w| w * every as f32).collect(),
+        width: nth(&layer.width, &layer.offsets, every).map(|w| w * wider).collect(),
         offsets: Offsets::from_counts(layer.offsets.counts().step_by(every)),
         opacity: layer.opacity.iter().copied().step_by(every).collect(),
         color: match layer.color_per_point() {
@@ -137,7 +190,15 @@ fn normals(run: &mut Runner<'_>, drawn: &Drawn, pose: &SkinPose, i: usize) -> Re
     })
 }
 
-fn draw(run: &mut Runner<'_>, drawn: &Drawn, camera: &Camera, frame: i32, size: [u32; 2]) -> Result<Image, Error> {
+/// Draws a region of the picture of `size` at a frame.
+fn draw(
+    run: &mut Runner<'_>,
+    drawn: &Drawn,
+    camera: &Camera,
+    frame: i32,
+    size: [u32; 2],
+    region: &Region,
+) -> Result<Image, Error> {
     let layers = &drawn.layers;
     let (pose, origin) = (pose(run, frame)?, run.origin()?);
     let positions = (0..layers.len()).map(|i| positions(run, drawn, i, frame)).collect::<Result<Vec<_>, Error>>()?;
@@ -167,15 +228,21 @@ fn draw(run: &mut Runner<'_>, drawn: &Drawn, camera: &Camera, frame: i32, size: 
         color: SKIN,
     });
     let scene = Scene { skin: surface, layers: &views, lights: &lights, background: BACKGROUND };
-    Ok(render(&scene, camera, size[0] as usize, size[1] as usize, &Settings::default()).0)
+    Ok(render_region(&scene, camera, size.map(|x| x as usize), region, &Settings::default()).0)
 }
 
 fn save(run: &mut Runner<'_>, what: What, name: &str, picture: &Image) -> Result<(), Error> {
-    let out = run.project.out_dir();
-    std::fs::create_dir_all(&out).map_err(Error::disk(&out))?;
-    let part = unfinished(&out.join(name));
-    write_png(&part, picture.width, picture.height, &picture.to_srgb8())?;
+    let part = write(&run.project.out_dir().join(name), picture)?;
     export::publish(run, what, vec![(part, name.to_owned())])
+}
+
+/// Writes a picture beside its path.
+fn write(path: &Path, picture: &Image) -> Result<PathBuf, Error> {
+    let out = path.parent().unwrap_or(path);
+    std::fs::create_dir_all(out).map_err(Error::disk(out))?;
+    let part = unfinished(path);
+    write_png(&part, picture.width, picture.height, &picture.to_srgb8())?;
+    Ok(part)
 }
 
 #[cfg(test)]
@@ -188,7 +255,7 @@ mod tests {
         let layer = HairLayer { width: vec![0.5; 9], opacity: vec![1.0, 0.5, 0.25], offsets, ..HairLayer::default() };
         let hairs: Vec<[f32; 3]> = (0..3).map(|h| [h as f32; 3]).collect();
         let points: Vec<[f32; 3]> = (0..9).map(|p| [p as f32; 3]).collect();
-        let of = |color: &[[f32; 3]]| thinned(HairLayer { color: color.to_vec(), ..layer.clone() }, 2);
+        let of = |color: &[[f32; 3]]| thinned(HairLayer { color: color.to_vec(), ..layer.clone() }, 2, 1.0);
         assert_eq!(of(&hairs).color, [[0.0; 3], [2.0; 3]]);
         let drawn = of(&points);
         assert_eq!(drawn.color, [0.0f32, 1.0, 5.0, 6.0, 7.0, 8.0].map(|p| [p; 3]));

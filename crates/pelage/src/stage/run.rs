@@ -31,6 +31,9 @@ pub struct Options {
     pub without: Option<Stage>,
     /// Make the contact sheet too.
     pub sheet: bool,
+    /// This is not the shot itself but a thinned one (see [`Project::thinned`]): what it does is not remembered as the
+    /// shot's last run, and what is odd in it is told when the shot itself runs.
+    pub draft: bool,
 }
 
 /// What would run in a stage, and why.
@@ -89,7 +92,7 @@ impl<'a> Runner<'a> {
         }
         let cache = project.cache_dir();
         let store = Store::open_clearing(&cache, &[&project.out_dir()]).map_err(Error::disk(&cache))?;
-        let last = store.last(&project.shot.value.shot.name);
+        let last = if options.draft { BTreeMap::new() } else { store.last(&project.shot.value.shot.name) };
         Ok(Runner {
             project,
             plan: Plan::new(project),
@@ -160,7 +163,7 @@ impl<'a> Runner<'a> {
         self.progress.say_of_stage(line);
     }
 
-    /// Shows the fraction done of something that takes long; never stops it.
+    /// Shows the fraction done of something that takes long; false as soon as the run is to stop.
     pub(super) fn ticker(&self, what: &str) -> impl Fn(f64) -> bool + Sync + use<> {
         self.progress.ticker(what)
     }
@@ -310,7 +313,7 @@ impl<'a> Runner<'a> {
             let step = self.plan.step(*what);
             last.insert(step.name.clone(), step.recipe.clone());
         }
-        if last != self.last {
+        if last != self.last && !self.options.draft {
             self.store.set_last(&shot, &last).map_err(Error::disk(&self.project.cache_dir()))?;
         }
         self.hashes.borrow_mut().save();
@@ -339,6 +342,9 @@ impl<'a> Runner<'a> {
                 waiting.insert(step.what);
                 continue;
             }
+            if self.progress.is_stopped() {
+                return Err(Error::Stopped);
+            }
             self.progress.working(&step.name);
             self.make(step.what)?;
             if stage != Stage::Simulate {
@@ -360,7 +366,7 @@ impl<'a> Runner<'a> {
         report.skipped.extend(skipped.filter(|s| s.1 > 0));
         report.warnings = std::mem::take(&mut self.warnings);
         report.warnings.extend(self.store.take_warnings());
-        for warning in &report.warnings {
+        for warning in report.warnings.iter().filter(|_| !self.options.draft) {
             self.progress.say(&format!("warning: {warning}"));
         }
         report.wall_s = wall.elapsed().as_secs_f64();

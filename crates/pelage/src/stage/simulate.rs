@@ -255,6 +255,9 @@ fn settings(run: &Runner<'_>, i: usize) -> Settings {
 }
 
 fn failed(run: &Runner<'_>, i: usize, e: &SimError) -> Error {
+    if matches!(e, SimError::Stopped) {
+        return Error::Stopped;
+    }
     Error::input(format!("layer {} can't be simulated: {e}", run.project.groom.value.layer[i].name), "")
 }
 
