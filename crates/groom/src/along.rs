@@ -22,11 +22,27 @@ fn place(stations: usize, t: f32) -> (usize, f32) {
 /// \[V\] diameters of hairs from those of their roots (one a hair, scene units) and factors at two or more stations at
 /// equal distances from root to tip.
 pub fn point_widths(root: &[f32], offsets: &Offsets, profile: &[f32]) -> Vec<f32> {
-    let at = |t| {
-        let (i, f) = place(profile.len(), t);
-        profile[i] + (profile[i + 1] - profile[i]) * f
-    };
-    spread(root, offsets, |w, t| w * at(t))
+    spread(root, offsets, |w, t| w * value(profile, t))
+}
+
+/// Value at fraction `t` of the way along a hair from two or more stations.
+fn value(profile: &[f32], t: f32) -> f32 {
+    let (i, f) = place(profile.len(), t);
+    profile[i] + (profile[i + 1] - profile[i]) * f
+}
+
+/// Values at the points of hairs of `points` points from two or more stations; none from none.
+pub(crate) fn at_points(profile: &[f32], points: usize) -> Vec<f32> {
+    if profile.is_empty() { Vec::new() } else { (0..points).map(|k| value(profile, fraction(k, points))).collect() }
+}
+
+/// \[V\] diameters and \[C\] opacities of hairs with factors on both for each hair; opacities stay within 0 and 1.
+pub fn scaled(offsets: &Offsets, width: &[f32], opacity: &[f32], factor: &[[f32; 2]]) -> (Vec<f32>, Vec<f32>) {
+    let mut wide = Vec::with_capacity(width.len());
+    for (h, f) in factor.iter().enumerate() {
+        wide.extend(width[offsets.range(h)].iter().map(|w| w * f[0]));
+    }
+    (wide, opacity.iter().zip(factor).map(|(o, f)| (o * f[1]).clamp(0.0, 1.0)).collect())
 }
 
 /// \[V\] linear colours of hairs from one a hair and factors for red, green and blue at two or more stations at equal

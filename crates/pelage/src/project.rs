@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::cache::FileHashes;
-use crate::config::{BodyKind, BodyMesh, Document, Emitter, Feature, GroomFile, Material, SEGMENTS, ShotFile, Target};
+use crate::config::{BodyKind, BodyMesh, Document, Emitter, Feature, GroomFile, Keyed, Material, SEGMENTS, ShotFile, Target};
 use crate::format::csv;
 use pelage_geom::RigidMotion;
 use pelage_geom::motion::RigidTransform;
@@ -189,6 +189,7 @@ impl Project {
         let motions = self.bodies.iter().map(|b| &b.motion).chain([&self.motion]).flatten().map(|m| &m.file);
         let single = [&self.rest, &self.curves, &self.drawn].into_iter().flatten();
         let maps = self.maps.values().flatten().map(|(_, file)| file);
+        let single = single.chain(self.particles.iter().flatten());
         single.chain(skins).chain(self.bodies.iter().map(|b| &b.file)).chain(motions).chain(maps).collect()
     }
 
@@ -320,6 +321,13 @@ fn check_overrides(shot: &Document<ShotFile>, groom: &Document<GroomFile>) -> Re
         if o.clump >= layer.clump.len() {
             let what = format!("layer {} has {} levels of clumps", o.layer, layer.clump.len());
             return Err(shot.error(&format!("{at}.clump"), what, "they are numbered from 0").into());
+        }
+        for (key, keyed) in [("percent", &o.percent), ("rate", &o.rate)] {
+            let fine = |k: &Keyed<f64>| k.in_order() && k.0.iter().all(|k| (0.0..=1.0).contains(&k.value));
+            if !keyed.iter().all(fine) {
+                let help = "a number, or key frames in order";
+                return Err(shot.error(&format!("{at}.{key}"), "must be between 0 and 1", help).into());
+            }
         }
     }
     Ok(())

@@ -6,7 +6,8 @@
 
 use super::axes::{Along, RootAxes};
 use super::turn::sin_cos_turn;
-use super::{CHUNK, Param, V3, at_station, lengths, relay, station_weights};
+use super::{CHUNK, Param, V3, lengths};
+use crate::along::at_points;
 use rayon::prelude::*;
 
 /// Offset along one axis. Lengths in radii, arc length in pitches: with radius and pitch 1 those of the paper, in scene
@@ -116,8 +117,7 @@ pub struct Curl<'a> {
 
 /// Curls hairs of `points` points. Roots stay; a hair of radius 0 keeps its bytes.
 pub fn curl(points: usize, c: &Curl, position: &mut [[f32; 3]]) {
-    let stations = if c.profile.is_empty() { Vec::new() } else { station_weights(c.profile.len(), points) };
-    let profile: Vec<f32> = stations.iter().map(|w| at_station(w, c.profile)).collect();
+    let profile = at_points(c.profile, points);
     position.par_chunks_mut(CHUNK * points).enumerate().for_each(|(chunk, out)| {
         let mut s = Scratch::default();
         for (h, hair) in (chunk * CHUNK..).zip(out.chunks_exact_mut(points)) {
@@ -134,27 +134,35 @@ pub fn curl(points: usize, c: &Curl, position: &mut [[f32; 3]]) {
             lengths(hair, &mut s.length);
             let total: f32 = s.length.iter().sum();
             own.displace(c, h, &profile, hair, &mut s.along);
-            // Shorten the middle line until the curled hair is as long as it was.
-            let mut share = 1.0f32;
+            // Cut the middle line until the curled hair is as long as the straight one was.
+            let (mut share, mut curled) = (1.0f32, arc_length(hair));
             for _ in 0..SHORTENINGS {
-                let curled: f32 = hair.windows(2).map(|w| (V3::from(w[1]) - V3::from(w[0])).norm()).sum();
-                if curled.is_nan() || curled <= total * (1.0 + CLOSE) {
+                if !curled.is_finite() || (curled - total).abs() <= total * CLOSE {
                     break;
                 }
-                share *= total / curled;
+                share = (share * total / curled).min(1.0);
                 shortened(&s.spine, &s.length, share * total, hair);
                 own.displace(c, h, &profile, hair, &mut s.along);
+                curled = arc_length(hair);
             }
-            relay(hair, &s.length);
+            if curled > 0.0 {
+                let (root, scale) = (hair[0], total / curled);
+                let from_root = |p: &[f32; 3]| std::array::from_fn(|x| root[x] + (p[x] - root[x]) * scale);
+                hair[1..].iter_mut().for_each(|p| *p = from_root(p));
+            }
         }
     });
+}
+
+fn arc_length(hair: &[[f32; 3]]) -> f32 {
+    hair.windows(2).map(|w| (V3::from(w[1]) - V3::from(w[0])).norm()).sum()
 }
 
 /// Rounds of shortening: each leaves about a tenth of the error before it.
 const SHORTENINGS: usize = 4;
 
-/// Relative excess of length that is left to the last step, which shrinks the segments: a thousandth does not show in a
-/// radius.
+/// Relative error of length that is left to the last step, which scales the hair about its root: a thousandth does not
+/// show in a radius.
 const CLOSE: f32 = 1e-3;
 
 #[derive(Default)]

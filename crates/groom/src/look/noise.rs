@@ -2,12 +2,13 @@
 
 use super::axes::{Along, RootAxes};
 use super::perlin::{key, perlin1, perlin3};
-use super::{CHUNK, Param, V3, at_station, lengths, relay, station_weights};
+use super::{CHUNK, Param, V3, lengths, relay};
 use pelage_geom::StrandId;
+use crate::along::at_points;
 use rayon::prelude::*;
 
 /// Root mean square of [`perlin1`].
-const RMS1: f32 = 0.4;
+const RMS1: f32 = 0.281_39;
 
 /// The way through noise in space that a hair takes: no lattice direction, so that no two of its cells are alike.
 const WAY: [f32; 3] = [0.529, 0.671, 0.519];
@@ -39,8 +40,7 @@ pub struct Noise<'a> {
 
 /// Adds noise to hairs of `points` points. Roots stay; a hair of amplitude 0 keeps its bytes.
 pub fn noise(points: usize, n: &Noise, position: &mut [[f32; 3]]) {
-    let stations = if n.profile.is_empty() { Vec::new() } else { station_weights(n.profile.len(), points) };
-    let profile: Vec<f32> = stations.iter().map(|w| at_station(w, n.profile)).collect();
+    let profile = at_points(n.profile, points);
     let of_all = key(n.seed, 0, n.channel);
     let per_unit = 1.0 / n.size;
     position.par_chunks_mut(CHUNK * points).enumerate().for_each(|(chunk, out)| {

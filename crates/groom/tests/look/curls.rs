@@ -185,8 +185,8 @@ fn a_rigid_motion_takes_curls_along_and_radius_zero_changes_no_byte() {
 
 #[test]
 fn axes_turn_no_more_than_the_hair_from_frame_to_frame() {
-    // A hair that swings: between frames its axes turn by no more than the largest turn of its tangents and the way the
-    // root's axes go along.
+    // A hair that swings, bent up to a right angle: its axes turn by at most the largest turn of its tangents, and by the
+    // area that these sweep on the sphere of directions, which no frame without twist can escape.
     let points = 40;
     let swing = |t: f64| -> Vec<[f32; 3]> {
         let mut p = V::zeros();
@@ -206,6 +206,6 @@ fn axes_turn_no_more_than_the_hair_from_frame_to_frame() {
         let angle = |u: V, v: V| u.cross(&v).norm().atan2(u.dot(&v));
         let hair: f64 = (0..points).map(|k| angle(a[k][0], b[k][0])).fold(0.0, f64::max);
         let axis = (0..points).map(|k| angle(a[k][1], b[k][1])).fold(0.0, f64::max);
-        assert!(axis <= 1.05 * hair + 1e-6, "{axis} {hair}");
+        assert!(axis <= 1.25 * hair + 1e-6, "{axis} {hair}");
     }
 }

@@ -94,7 +94,7 @@ fn clumps_of_clumps_take_whole_clumps() {
     let fine = members(&sites, fine_centre.clone(), &vec![0.7; fine_centre.len()], 0.7, &[]);
     let open = representatives(&fine);
     let centre: Vec<u32> = every(3000, 100);
-    let radius = vec![2.0; centre.len()];
+    let radius = vec![4.0; centre.len()];
     let coarse = members(&sites, centre, &radius, 2.0, &open);
     let whole = whole_clumps(&sites, &fine, &radius, coarse);
     for h in 0..3000 {

@@ -519,8 +519,8 @@ pub struct Emitter {
     pub file: Option<PathBuf>,
     /// Where particles start, scene units: three numbers, or key frames along its way.
     pub position: Option<Keyed<Vector>>,
-    /// Where they fly, along the scene's axes: three numbers, or key frames.
-    pub direction: Option<Keyed<Vector>>,
+    /// Where they fly, along the scene's axes.
+    pub direction: Option<Vector>,
     /// Half the angle of the cone that they leave in, degrees. Default: 0.
     #[serde(default)]
     pub spread: f64,
@@ -529,7 +529,7 @@ pub struct Emitter {
     pub rate: f64,
     /// First and last frame. Default: those of the shot.
     #[serde(default, deserialize_with = "some_frames")]
-    pub frames: Option<[f64; 2]>,
+    pub frames: Option<[i32; 2]>,
     /// Names its random numbers. Default: 0.
     #[serde(default)]
     pub seed: u32,
@@ -555,7 +555,7 @@ fn never() -> Keyed<f64> {
     Keyed::constant(0.0)
 }
 
-fn some_frames<'de, D: Deserializer<'de>>(d: D) -> Result<Option<[f64; 2]>, D::Error> {
+fn some_frames<'de, D: Deserializer<'de>>(d: D) -> Result<Option<[i32; 2]>, D::Error> {
     exactly(d).map(Some)
 }
 
@@ -760,7 +760,7 @@ impl Document<GroomFile> {
             self.within(at, k.value, v.range[0], v.range[1])?;
             self.within(at, k.frame, -1e9, 1e9)?;
         }
-        if v.value.0.value.0.is_empty() || v.value.0.value.0.windows(2).any(|k| k[0].frame >= k[1].frame) {
+        if !v.value.0.value.in_order() {
             return Err(self.error(at, "key frames are not in order", "write one or more, each after the one before"));
         }
         self.within(&format!("{at}.noise"), v.value.0.noise, 0.0, if v.added { 1e3 } else { 1.0 })?;
@@ -811,6 +811,10 @@ impl Document<GroomFile> {
                 let help = "name one of the [[emitter]] of this file";
                 return Err(self.error(&format!("{at}.areas"), format!("there is no emitter `{name}`"), help));
             }
+        }
+        if c.simulate && c.wet.is_some() {
+            let help = "give it to a level that is not simulated";
+            return Err(self.error(&format!("{at}.wet"), "a simulated level hands on its shape only", help));
         }
         if c.simulate && !c.areas.is_empty() {
             return Err(self.error(&format!("{at}.simulate"), "areas come and go in the shot", "take one of the two out"));
@@ -882,11 +886,19 @@ impl Document<GroomFile> {
                 let help = "give `file`, or `position` and `direction`";
                 return Err(self.error(&at, "does not say where its particles come from", help));
             }
-            for (key, v) in [("position", &e.position), ("direction", &e.direction)] {
-                let bad = |v: &Vector| !v.0.iter().all(|x| x.is_finite()) || (key == "direction" && v.0 == [0.0; 3]);
-                if v.iter().flat_map(|k| &k.0).any(|k| bad(&k.value)) {
-                    return Err(self.error(&format!("{at}.{key}"), "must be three finite numbers, a direction not 0", ""));
-                }
+            let finite = |v: &Vector| v.0.iter().all(|x| x.is_finite());
+            if !e.position.iter().flat_map(|p| &p.0).all(|k| finite(&k.value)) {
+                return Err(self.error(&format!("{at}.position"), "must be three finite numbers", ""));
+            }
+            if !e.direction.iter().all(|d| finite(d) && d.0 != [0.0; 3]) {
+                return Err(self.error(&format!("{at}.direction"), "must be a direction", "for example [0, -1, 0]"));
+            }
+            if !e.position.iter().all(Keyed::in_order) {
+                let help = "each comes after the one before";
+                return Err(self.error(&format!("{at}.position"), "key frames are not in order", help));
+            }
+            if e.frames.is_some_and(|f| f[0] > f[1]) {
+                return Err(self.error(&format!("{at}.frames"), "the last frame comes before the first", ""));
             }
             self.within(&format!("{at}.spread"), e.spread, 0.0, 180.0)?;
             self.within(&format!("{at}.rate"), e.rate, 0.0, 1e5)?;
@@ -894,6 +906,10 @@ impl Document<GroomFile> {
                 [("radius", &e.radius, 1e6), ("percent", &e.percent, 1.0), ("clump_rate", &e.clump_rate, 1.0)]
             {
                 v.0.iter().try_for_each(|k| self.within(&format!("{at}.{key}"), k.value, 0.0, most))?;
+                if !v.in_order() {
+                    let help = "each comes after the one before";
+                    return Err(self.error(&format!("{at}.{key}"), "key frames are not in order", help));
+                }
             }
         }
         Ok(())

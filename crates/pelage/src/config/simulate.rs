@@ -282,6 +282,11 @@ impl<T> Keyed<T> {
     pub fn constant(value: T) -> Self {
         Keyed(vec![Key { frame: 0.0, value }])
     }
+
+    /// True if there are keys, each after the one before.
+    pub fn in_order(&self) -> bool {
+        !self.0.is_empty() && self.0.windows(2).all(|k| k[0].frame < k[1].frame)
+    }
 }
 
 impl Keyed<[f64; 3]> {

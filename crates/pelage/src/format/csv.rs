@@ -1,8 +1,9 @@
-//! Rigid motions as text: one sample a line.
+//! Rigid motions and particles as text: one sample a line.
 
 use super::FormatError;
 use super::ply::read_bytes;
 use pelage_geom::RigidMotion;
+use pelage_groom::areas::Particle;
 use std::path::Path;
 
 /// Quaternions whose length is off by more than this are errors, not rounding: three decimals are the least that
@@ -24,45 +25,19 @@ pub fn read_motion(path: &Path, meters_per_unit: f64, fps: f64) -> Result<RigidM
 }
 
 fn parse_motion(path: &Path, text: &str, meters_per_unit: f64, fps: f64) -> Result<RigidMotion, FormatError> {
-    let wrong = |line: usize, what: String| FormatError::new(path, what).at(format!("line {line}"));
-    let text = text.trim_start_matches('\u{feff}');
-    let mut lines = text
-        .split(['\n', '\r'])
-        .zip(LineNumbers::new(text))
-        .map(|(line, number)| (number, line.trim()))
-        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
-    let Some((number, header)) = lines.next() else {
-        return Err(FormatError::new(path, "no lines: expected a header and one sample a line"));
-    };
-    let columns = columns(header).map_err(|what| {
-        wrong(number, what).hint("expected columns time_s (or frame), tx, ty, tz, qx, qy, qz, qw, separated by commas")
-    })?;
-    let names = header.split(',').count();
+    let (rows, time_name) = rows(path, text, COLUMNS)?;
     let mut motion = RigidMotion::default();
-    for (number, line) in lines {
-        let cells: Vec<&str> = line.split(',').map(unquote).collect();
-        if cells.len() != names {
-            return Err(wrong(number, format!("{} values, the header has {names} columns", cells.len())));
-        }
-        let mut v = [0.0; 8];
-        for (value, (cell, name)) in v.iter_mut().zip(&columns) {
-            let text = cells[*cell];
-            *value = match text.parse::<f64>() {
-                Ok(x) if x.is_finite() => x,
-                Ok(_) => return Err(wrong(number, format!("column {name}: '{text}' is not a finite number"))),
-                Err(_) => return Err(wrong(number, format!("column {name}: '{text}' is not a number"))),
-            };
-        }
-        let time = if columns[0].1 == "frame" { v[0] / fps } else { v[0] };
+    for (number, v) in rows {
+        let wrong = |what: String| FormatError::new(path, what).at(format!("line {number}"));
+        let time = if time_name == "frame" { v[0] / fps } else { v[0] };
         if let Some(last) = motion.time.last().filter(|t| **t >= time) {
-            let what =
-                format!("column {}: time {time} s does not come after {last} s of the line before", columns[0].1);
-            return Err(wrong(number, what).hint("samples must be in the order of time, each time once"));
+            let what = format!("column {time_name}: time {time} s does not come after {last} s of the line before");
+            return Err(wrong(what).hint("samples must be in the order of time, each time once"));
         }
         let norm = v[4..].iter().map(|x| x * x).sum::<f64>().sqrt();
         if (norm - 1.0).abs() > UNIT_TOLERANCE {
             let what = format!("columns qx, qy, qz, qw: a rotation has length 1, this has {norm}");
-            return Err(wrong(number, what).hint("check the order of the columns (the real part is qw)"));
+            return Err(wrong(what).hint("check the order of the columns (the real part is qw)"));
         }
         motion.time.push(time);
         motion.translation.push(std::array::from_fn(|i| v[1 + i] / meters_per_unit));
@@ -74,15 +49,73 @@ fn parse_motion(path: &Path, text: &str, meters_per_unit: f64, fps: f64) -> Resu
     }
 }
 
-/// For each of [`COLUMNS`] where it stands and what the header calls it.
-fn columns(header: &str) -> Result<Vec<(usize, &'static str)>, String> {
+/// Reads a table of particles, laid out like a motion table: `frame` (or `time_s`, times `fps`, from frame 0) when each
+/// leaves, `x y z` where from, scene units, `dx dy dz` where to.
+pub fn read_particles(path: &Path, fps: f64) -> Result<Vec<Particle>, FormatError> {
+    let bytes = read_bytes(path)?;
+    let text = std::str::from_utf8(&bytes)
+        .map_err(|_| FormatError::new(path, "not a text file in UTF-8").hint("save it as CSV in UTF-8"))?;
+    let (rows, time_name) = rows(path, text, ["time_s", "x", "y", "z", "dx", "dy", "dz"])?;
+    let particle = |(k, (number, v)): (usize, (usize, [f64; 7]))| {
+        let direction = [v[4], v[5], v[6]];
+        if direction == [0.0; 3] {
+            let what = "columns dx, dy, dz: a particle needs a direction";
+            return Err(FormatError::new(path, what).at(format!("line {number}")));
+        }
+        let time = if time_name == "frame" { v[0] } else { v[0] * fps };
+        Ok(Particle { number: k as u64, time, origin: [v[1], v[2], v[3]], direction })
+    };
+    rows.into_iter().enumerate().map(particle).collect()
+}
+
+/// Rows of a table with their lines, and what it calls its first column: `time_s` or `frame`.
+type Rows<const N: usize> = (Vec<(usize, [f64; N])>, &'static str);
+
+fn rows<const N: usize>(path: &Path, text: &str, names: [&'static str; N]) -> Result<Rows<N>, FormatError> {
+    let wrong = |line: usize, what: String| FormatError::new(path, what).at(format!("line {line}"));
+    let text = text.trim_start_matches('\u{feff}');
+    let mut lines = text
+        .split(['\n', '\r'])
+        .zip(LineNumbers::new(text))
+        .map(|(line, number)| (number, line.trim()))
+        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+    let Some((number, header)) = lines.next() else {
+        return Err(FormatError::new(path, "no lines: expected a header and one sample a line"));
+    };
+    let columns = columns(header, &names).map_err(|what| {
+        let all = names[1..].join(", ");
+        wrong(number, what).hint(format!("expected columns time_s (or frame), {all}, separated by commas"))
+    })?;
+    let cells_of_header = header.split(',').count();
+    let mut out = Vec::new();
+    for (number, line) in lines {
+        let cells: Vec<&str> = line.split(',').map(unquote).collect();
+        if cells.len() != cells_of_header {
+            return Err(wrong(number, format!("{} values, the header has {cells_of_header} columns", cells.len())));
+        }
+        let mut v = [0.0; N];
+        for (value, (cell, name)) in v.iter_mut().zip(&columns) {
+            let text = cells[*cell];
+            *value = match text.parse::<f64>() {
+                Ok(x) if x.is_finite() => x,
+                Ok(_) => return Err(wrong(number, format!("column {name}: '{text}' is not a finite number"))),
+                Err(_) => return Err(wrong(number, format!("column {name}: '{text}' is not a number"))),
+            };
+        }
+        out.push((number, v));
+    }
+    Ok((out, columns[0].1))
+}
+
+/// For each of `names` where it stands and what the header calls it.
+fn columns(header: &str, names: &[&'static str]) -> Result<Vec<(usize, &'static str)>, String> {
     let cells: Vec<String> = header.split(',').map(|c| unquote(c).to_ascii_lowercase()).collect();
-    let read = |c: &String| COLUMNS.contains(&c.as_str()) || c == "frame";
+    let read = |c: &String| names.contains(&c.as_str()) || c == "frame";
     if let Some((k, name)) = cells.iter().enumerate().find(|(k, c)| read(c) && cells[..*k].contains(c)) {
         return Err(format!("column '{name}' stands twice (the second is column {})", k + 1));
     }
     let find = |name: &'static str| cells.iter().position(|c| c == name).map(|k| (k, name));
-    COLUMNS
+    names
         .iter()
         .map(|name| {
             let or_frame = if *name == "time_s" { find("frame") } else { None };

@@ -1,23 +1,140 @@
-//! Animated clump areas: where particles have hit the skin, and what they do to clumps.
+//! Animated clump areas: where particles have hit the skin, frame after frame, and what they do to clumps.
 
 use super::clumps::RestSites;
-use super::run::Runner;
+use super::run::{Counts, Runner};
+use super::tables::{decode, encode, root_columns, roots_of, table};
+use super::{What, groom};
 use crate::Error;
+use crate::config::{Emitter as Settings, Keyed};
+use crate::format::csv;
+use crate::format::ply::Column;
+use crate::project::SkinAt;
+use pelage_geom::{Bvh, NONE, SurfacePoint};
+use pelage_groom::areas::{Area, AreaLaw, Centres, Emitter, Hit, Particle, areas, hits as find_hits, wetness};
 use pelage_groom::look::member::Members;
+use std::rc::Rc;
+
+/// Hits of every emitter up to the end of a frame.
+pub type Hits = Vec<Vec<Hit>>;
+
+/// Hits up to the end of a frame: those of the frame before, and those of particles that leave in this one.
+pub fn hits(run: &mut Runner<'_>, frame: i32) -> Result<Rc<Hits>, Error> {
+    if let Some((_, found)) = run.hits.as_ref().filter(|(f, _)| *f == frame) {
+        return Ok(found.clone());
+    }
+    let what = What::Hits(frame);
+    let emitters = run.project.groom.value.emitter.len();
+    let found = match run.fetch(what).and_then(|e| read(e.payload.first()?, emitters)) {
+        Some(found) => found,
+        None => find(run, frame)?,
+    };
+    let found = Rc::new(found);
+    run.hits = Some((frame, found.clone()));
+    Ok(found)
+}
+
+fn find(run: &mut Runner<'_>, frame: i32) -> Result<Hits, Error> {
+    let project = run.project;
+    let emitters = &project.groom.value.emitter;
+    let mut all = match project.frames.range(..frame).next_back() {
+        Some((before, _)) => hits(run, *before)?.to_vec(),
+        None => vec![Vec::new(); emitters.len()],
+    };
+    let particles = (0..emitters.len()).map(|k| particles(run, k, frame)).collect::<Result<Vec<_>, _>>()?;
+    let at = &project.frames[&frame];
+    if particles.iter().any(|p| !p.is_empty()) {
+        let skin = groom::skin(run)?;
+        let posed;
+        let (bvh, placement) = match at {
+            SkinAt::Rest => (skin.bvh(), None),
+            SkinAt::Rigid(t) => (skin.bvh(), Some(t)),
+            SkinAt::File(_) => {
+                posed = Bvh::build(&skin.pose(at)?.position, &skin.mesh.triangle, &skin.topology);
+                (&posed, None)
+            }
+        };
+        for (all, particles) in all.iter_mut().zip(&particles) {
+            all.extend(find_hits(particles, bvh, placement));
+        }
+    }
+    let count = all.iter().map(|h| h.len() as u64).sum();
+    run.keep(What::Hits(frame), Counts::from([("particles on the skin".to_owned(), count)]), &[("data.ply", &write(&all))])?;
+    Ok(all)
+}
+
+/// Particles of an emitter that leave between a frame and the next.
+fn particles(run: &Runner<'_>, k: usize, frame: i32) -> Result<Vec<Particle>, Error> {
+    let shot = &run.project.shot.value.shot;
+    let e = &run.project.groom.value.emitter[k];
+    if let Some(file) = &run.project.particles[k] {
+        let all = csv::read_particles(&file.path, shot.fps)?;
+        let leaves = |p: &Particle| (f64::from(frame)..f64::from(frame) + 1.0).contains(&p.time);
+        return Ok(all.into_iter().filter(leaves).collect());
+    }
+    let keys = e.position.iter().flat_map(|p| p.vectors().0);
+    let emitter = Emitter {
+        position: keys.map(|k| (k.frame, k.value)).collect(),
+        direction: e.direction.map_or([0.0; 3], |d| d.0),
+        spread: e.spread,
+        rate: e.rate,
+        seed: u64::from(e.seed),
+        frames: e.frames.unwrap_or(shot.frames),
+    };
+    Ok(emitter.particles(frame..frame + 1, shot.fps))
+}
+
+fn write(all: &Hits) -> Vec<u8> {
+    let flat = || all.iter().enumerate().flat_map(|(k, hits)| hits.iter().map(move |h| (k, h)));
+    let root: Vec<SurfacePoint> = flat().map(|(_, h)| h.point).collect();
+    let mut columns = root_columns(&root);
+    columns.push(("emitter", Column::U32(flat().map(|(k, _)| k as u32).collect())));
+    columns.push(("number", Column::U32(flat().map(|(_, h)| h.number as u32).collect())));
+    columns.push(("time", Column::F64(flat().map(|(_, h)| h.time).collect())));
+    encode("particles on the skin: where, of which emitter, when (frames)", &[table("hit", columns)])
+}
+
+fn read(bytes: &[u8], emitters: usize) -> Option<Hits> {
+    let file = decode(bytes)?;
+    let t = file.get("hit")?;
+    let Column::F64(time) = t.column("time")? else { return None };
+    let (emitter, number, point) = (t.u32("emitter")?, t.u32("number")?, roots_of(t)?);
+    let mut all = vec![Vec::new(); emitters];
+    for i in 0..t.rows {
+        all.get_mut(emitter[i] as usize)?.push(Hit { number: u64::from(number[i]), time: time[i], point: point[i] });
+    }
+    Some(all)
+}
 
 /// Clump percent and rate of every hair of a level at a frame: those of its clump's centre in the areas that are open.
 pub fn strengths(
-    _run: &mut Runner<'_>,
-    _i: usize,
-    _k: usize,
-    _frame: i32,
+    run: &mut Runner<'_>,
+    i: usize,
+    k: usize,
+    frame: i32,
     m: &Members,
-    _sites: &RestSites,
+    sites: &RestSites,
 ) -> Result<[Vec<f32>; 2], Error> {
-    Ok([vec![0.0; m.clump.len()], vec![0.0; m.clump.len()]])
+    let (skin, hits) = (groom::skin(run)?, hits(run, frame)?);
+    let groom = &run.project.groom.value;
+    let named = &groom.layer[i].clump[k].areas;
+    let origin = skin.origin();
+    let (mesh, topology, rest) = (&skin.mesh, &skin.topology, &skin.rest);
+    let place = |p: &SurfacePoint| {
+        let f = rest.frame(mesh, topology, p);
+        (f.origin.into(), [f.n.x as f32, f.n.y as f32, f.n.z as f32])
+    };
+    let open = |(e, hits): (&Settings, &Vec<Hit>)| areas(hits, &law(e), f64::from(frame), place);
+    let acting = groom.emitter.iter().zip(hits.iter()).filter(|(e, _)| named.contains(&e.name));
+    let all: Vec<Area> = acting.flat_map(open).collect();
+    let scene = |h: &u32| std::array::from_fn(|x| f64::from(sites.position[*h as usize][x]) + origin[x]);
+    let root: Vec<[f64; 3]> = m.centre.iter().map(scene).collect();
+    let normal: Vec<[f32; 3]> = m.centre.iter().map(|h| sites.normal[*h as usize]).collect();
+    let wet = wetness(&all, &Centres { root: &root, normal: &normal });
+    let of = |x: usize| m.clump.iter().map(|c| if *c == NONE { 0.0 } else { wet[*c as usize][x] }).collect();
+    Ok([of(0), of(1)])
 }
 
-/// Hits up to the end of a frame.
-pub fn hits(_run: &mut Runner<'_>, _frame: i32) -> Result<(), Error> {
-    Ok(())
+fn law(e: &Settings) -> AreaLaw {
+    let keys = |k: &Keyed<f64>| k.0.iter().map(|k| (k.frame, k.value)).collect();
+    AreaLaw { radius: keys(&e.radius), percent: keys(&e.percent), rate: keys(&e.clump_rate) }
 }

@@ -2,7 +2,7 @@
 //! then renamed.
 
 use super::run::{Counts, Runner};
-use super::plan_look::finished_rest;
+use super::plan_look::{finished_rest, is_wet};
 use super::{Step, What, curves, groom, instance, interpolate};
 use crate::Error;
 use crate::config::{ExportFormat, UpAxis};
@@ -182,29 +182,35 @@ fn frames(
 ) -> Result<(), Error> {
     let count = run.project.groom.value.layer.len();
     let load = |run: &mut Runner<'_>, f: i32| {
-        (0..count).map(|i| interpolate::positions(run, What::Frame(i, f))).collect::<Result<Vec<_>, Error>>()
+        (0..count).map(|i| interpolate::hairs(run, What::Frame(i, f))).collect::<Result<Vec<_>, Error>>()
     };
+    let looks = (0..count).map(|i| wet_look(run, i)).collect::<Result<Vec<_>, Error>>()?;
     let mut now = load(run, facts.frames[0])?;
-    let mut velocity: Vec<Vec<[f32; 3]>> = now.iter().map(|p| vec![[0.0; 3]; p.len()]).collect();
+    let mut velocity: Vec<Vec<[f32; 3]>> = now.iter().map(|p| vec![[0.0; 3]; p.position.len()]).collect();
     for (k, &frame) in facts.frames.iter().enumerate() {
         let next = facts.frames.get(k + 1).map(|f| load(run, *f)).transpose()?;
         if let Some(next) = &next {
             let rate = (facts.fps / f64::from(facts.frames[k + 1] - frame)) as f32;
             for (v, (a, b)) in velocity.iter_mut().zip(now.iter().zip(next)) {
-                v.par_iter_mut().zip(a.par_iter().zip(b)).for_each(|(v, (a, b))| {
+                v.par_iter_mut().zip(a.position.par_iter().zip(&b.position)).for_each(|(v, (a, b))| {
                     *v = std::array::from_fn(|x| (b[x] - a[x]) * rate);
                 });
             }
         }
-        let hair: Vec<HairFrame<'_>> = now
-            .iter()
-            .zip(&velocity)
-            .map(|(position, velocity)| HairFrame { position, velocity, ..HairFrame::default() })
+        let wet: Vec<(Vec<f32>, Vec<f32>)> = now.iter().zip(&looks).map(|(h, l)| h.wet_columns(l.as_ref())).collect();
+        let layers = now.iter().zip(&velocity).zip(&wet);
+        let hair: Vec<HairFrame<'_>> = layers
+            .map(|((h, velocity), (width, opacity))| HairFrame { position: &h.position, velocity, width, opacity })
             .collect();
         write(frame, &hair)?;
         now = next.unwrap_or_default();
     }
     Ok(())
+}
+
+/// Columns of a layer that the look changes from frame to frame; `None` if it changes none.
+fn wet_look(run: &mut Runner<'_>, i: usize) -> Result<Option<HairLayer>, Error> {
+    if is_wet(run.project, i) { look(run, i).map(Some) } else { Ok(None) }
 }
 
 /// Reads a PLY file back as curves: ids, counts and positions must be what was written.

@@ -7,8 +7,10 @@ use super::skin::Texel;
 use super::{Skin, SkinPose, What, groom, instance, interpolate, layer_seed};
 use crate::Error;
 use crate::config::{self, CurlKind, LookValue, WaveShape};
+use crate::format::HairLayer;
 use crate::project::SkinAt;
 use pelage_geom::{NONE, Vec3, rng};
+use pelage_groom::along::scaled;
 use pelage_groom::instance::Roots;
 use pelage_groom::look::axes::{RootAxes, carried, rest_axes};
 use pelage_groom::look::clump::{Clump, bind_lines, centre_lines, clump, dilations, drawn_lines, wet};
@@ -43,6 +45,16 @@ pub struct Displaced {
     pub position: Vec<[f32; 3]>,
     /// Factors on width and opacity of each hair; empty if nothing is wet.
     pub wet: Vec<[f32; 2]>,
+}
+
+impl Displaced {
+    /// Diameters at the points and opacities of wet hairs, those of `layer` times their factors; empty if nothing is wet.
+    pub fn wet_columns(&self, layer: Option<&HairLayer>) -> (Vec<f32>, Vec<f32>) {
+        match layer.filter(|_| !self.wet.is_empty()) {
+            Some(l) => scaled(&l.offsets, &l.width, &l.opacity, &self.wet),
+            None => Default::default(),
+        }
+    }
 }
 
 /// Hairs that come into a step as they leave it: with their finished number of points, displaced, out of the skin.

@@ -66,6 +66,12 @@ pub fn effects(project: &Project, i: usize) -> [Vec<Effect>; 2] {
     out
 }
 
+/// True if clumps of a layer change widths and opacities.
+pub fn is_wet(project: &Project, i: usize) -> bool {
+    let wet = |e: &Effect| matches!(e, Effect::Clump(k) if project.groom.value.layer[i].clump[*k].wet.is_some());
+    effects(project, i).iter().flatten().any(wet)
+}
+
 /// True if finished hairs of a layer are kept out of the skin. Hair from a curves file is taken as it is.
 pub fn collides(project: &Project, i: usize) -> bool {
     project.curves.is_none() && project.shot.value.look.collision && project.groom.value.layer[i].collision.enabled

@@ -1,5 +1,6 @@
 //! Preview: pictures of the hair by which a groom is judged.
 
+use super::look::Displaced;
 use super::run::Runner;
 use super::{SkinPose, What, curves, export, groom, instance, interpolate};
 use crate::Error;
@@ -139,14 +140,15 @@ fn nth<'a, T: Copy>(values: &'a [T], offsets: &'a Offsets, every: usize) -> impl
     (0..offsets.len()).step_by(every).flat_map(|h| values[offsets.range(h)].iter().copied())
 }
 
-/// Positions of the hairs to draw.
-fn positions(run: &mut Runner<'_>, drawn: &Drawn, i: usize, frame: i32) -> Result<Vec<[f32; 3]>, Error> {
-    let all = interpolate::positions(run, What::Frame(i, frame))?;
+/// The hairs to draw.
+fn hairs(run: &mut Runner<'_>, drawn: &Drawn, i: usize, frame: i32) -> Result<Displaced, Error> {
+    let all = interpolate::hairs(run, What::Frame(i, frame))?;
     if drawn.every == 1 {
         return Ok(all);
     }
     let offsets = export::look(run, i)?.offsets;
-    Ok(nth(&all, &offsets, drawn.every).collect())
+    let position = nth(&all.position, &offsets, drawn.every).collect();
+    Ok(Displaced { position, wet: all.wet.into_iter().step_by(drawn.every).collect() })
 }
 
 /// A camera that sees skin and hair at all of the frames, as near as it can.
@@ -158,9 +160,9 @@ fn camera(run: &mut Runner<'_>, drawn: &Drawn, frames: &[i32]) -> Result<Camera,
             points.extend_from_slice(&pose.position);
         }
         for (i, layer) in drawn.layers.iter().enumerate() {
-            let position = positions(run, drawn, i, *frame)?;
-            let hairs = layer.offsets.len();
-            for hair in (0..hairs).step_by(hairs.div_ceil(FRAMED).max(1)) {
+            let position = hairs(run, drawn, i, *frame)?.position;
+            let count = layer.offsets.len();
+            for hair in (0..count).step_by(count.div_ceil(FRAMED).max(1)) {
                 let hair = &position[layer.offsets.range(hair)];
                 points.extend(hair.iter().map(|p| std::array::from_fn::<f64, 3, _>(|x| f64::from(p[x]) + origin[x])));
             }
@@ -201,7 +203,8 @@ fn draw(
 ) -> Result<Image, Error> {
     let layers = &drawn.layers;
     let (pose, origin) = (pose(run, frame)?, run.origin()?);
-    let positions = (0..layers.len()).map(|i| positions(run, drawn, i, frame)).collect::<Result<Vec<_>, Error>>()?;
+    let hairs = (0..layers.len()).map(|i| hairs(run, drawn, i, frame)).collect::<Result<Vec<_>, Error>>()?;
+    let wet: Vec<(Vec<f32>, Vec<f32>)> = hairs.iter().zip(layers).map(|(h, l)| h.wet_columns(Some(l))).collect();
     let normals = (0..layers.len())
         .map(|i| match &pose {
             Some(pose) => normals(run, drawn, pose, i),
@@ -211,11 +214,11 @@ fn draw(
     let views: Vec<HairView<'_>> = (0..layers.len())
         .map(|i| HairView {
             offsets: &layers[i].offsets,
-            position: &positions[i],
+            position: &hairs[i].position,
             origin,
-            width: &layers[i].width,
+            width: if wet[i].0.is_empty() { &layers[i].width } else { &wet[i].0 },
             color: &layers[i].color,
-            opacity: &layers[i].opacity,
+            opacity: if wet[i].1.is_empty() { &layers[i].opacity } else { &wet[i].1 },
             root_normal: &normals[i],
         })
         .collect();
