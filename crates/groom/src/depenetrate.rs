@@ -110,18 +110,21 @@ pub fn depenetrate(
         hairs.push(hair);
         rest = others;
     }
-    let one = |line: &mut Vec<Vec3>, stored: &mut [[f32; 3]]| {
+    let one = |(line, open): &mut (Vec<Vec3>, Vec<bool>), stored: &mut [[f32; 3]]| {
         line.clear();
         line.extend(stored.iter().map(|p| space.read(p)));
         let probe = Probe { bvh, settings };
         // A sum that is not finite: a hair with a number that is not.
-        if !line.iter().map(Vec3::sum).sum::<f64>().is_finite() || probe.inside(line, held, true).is_none() {
+        if !line.iter().map(Vec3::sum).sum::<f64>().is_finite() {
             return DepenetrateCounts::default();
         }
-        Job::new(probe, &space, line, stored).run()
+        match probe.depth(line, held, open) {
+            0.0 => DepenetrateCounts::default(),
+            depth => Job::new(probe, &space, line, stored, open).run(depth),
+        }
     };
     let none = DepenetrateCounts::default;
-    hairs.into_par_iter().map_init(Vec::new, one).reduce(none, DepenetrateCounts::and)
+    hairs.into_par_iter().map_init(Default::default, one).reduce(none, DepenetrateCounts::and)
 }
 
 /// How stored positions lie in the space of the skin's hierarchy.
@@ -157,7 +160,7 @@ struct Dip {
 struct Ahead {
     /// Length that is outside.
     sure: f64,
-    /// Distance at the last sample or a lower bound of it, negative inside.
+    /// About the distance at the last sample, negative inside.
     last: f64,
 }
 
@@ -173,18 +176,17 @@ struct Probe<'a> {
 }
 
 impl Probe<'_> {
-    /// Deepest point beyond the arc length `held`; the first one found if `first`.
-    fn inside(&self, line: &[Vec3], held: f64, first: bool) -> Option<Dip> {
+    /// Greatest depth beyond the arc length `held`, 0 if nothing is inside; and which segments are, into `open`.
+    fn depth(&self, line: &[Vec3], held: f64, open: &mut Vec<bool>) -> f64 {
+        open.clear();
         let mut left: f64 = line.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
-        let (mut before, mut ahead, mut deepest) = (0.0, Ahead::UNKNOWN, None);
+        let (mut before, mut ahead, mut deepest) = (0.0, Ahead::UNKNOWN, 0.0f64);
         for w in line.windows(2) {
             let length = (w[1] - w[0]).norm();
-            if before + length > held {
-                deeper(&mut deepest, self.dip(w[0], w[1], (held - before).max(0.0), left, &mut ahead));
-                if first && deepest.is_some() {
-                    break;
-                }
-            }
+            let from = (held - before).max(0.0);
+            let dip = if from < length { self.dip(w[0], w[1], from, left, &mut ahead) } else { None };
+            open.push(dip.is_some());
+            deepest = deepest.max(dip.map_or(0.0, |d| d.depth));
             before += length;
             left -= length;
         }
@@ -217,13 +219,21 @@ impl Probe<'_> {
             let out = (c.position - at).try_normalize(1e-6 * step).unwrap_or(c.normal);
             (c.signed_distance, (depth > 0.0).then_some(Dip { t: s / length, depth, out }))
         };
-        let mut deepest = None;
+        let (mut deepest, mut untested) = (None, true);
         let (mut now, dip) = sample(s, ahead.last);
         deeper(&mut deepest, dip);
         loop {
             if now >= 0.0 && s + now >= length {
                 *ahead = Ahead { sure: s + now - length, last: now };
                 return deepest;
+            }
+            if now >= 0.0 && untested {
+                untested = false;
+                // Sure up to s + now; a ray tells about the rest.
+                if self.bvh.ray(a + direction * (s + now), direction, length - s - now).is_none() {
+                    *ahead = Ahead { sure: 0.0, last: now };
+                    return deepest;
+                }
             }
             let end = (s + step.max(now)).min(length);
             let (next, dip) = sample(end, now);
@@ -270,7 +280,7 @@ struct Job<'a> {
     /// Vertices that were pushed, rather than following others or staying.
     pushed: Vec<bool>,
     /// Segments that have moved since they were last looked at.
-    open: Vec<bool>,
+    open: &'a mut Vec<bool>,
     /// Length at the root that is left alone: more than asked for where that cannot suffice.
     held: f64,
     /// What a coordinate may be off by as stored, in all.
@@ -278,7 +288,13 @@ struct Job<'a> {
 }
 
 impl<'a> Job<'a> {
-    fn new(probe: Probe<'a>, space: &'a Space<'a>, line: &'a mut [Vec3], stored: &'a mut [[f32; 3]]) -> Self {
+    fn new(
+        probe: Probe<'a>,
+        space: &'a Space<'a>,
+        line: &'a mut [Vec3],
+        stored: &'a mut [[f32; 3]],
+        open: &'a mut Vec<bool>,
+    ) -> Self {
         let held = probe.settings.held;
         let root = probe.bvh.closest(line[0], f64::INFINITY).map_or(0.0, |c| -c.signed_distance);
         let largest = stored.iter().flatten().fold(0.0f32, |m, x| m.max(x.abs()));
@@ -288,7 +304,7 @@ impl<'a> Job<'a> {
             drawn: (line.to_vec(), stored.to_vec()),
             length: line.windows(2).map(|w| (w[1] - w[0]).norm()).collect(),
             pushed: vec![false; line.len()],
-            open: vec![true; line.len() - 1],
+            open,
             held: if root > SHALLOW * held { held.max(2.0 * root) } else { held },
             grain: f64::from(4.0 * f32::EPSILON * largest),
             line,
@@ -296,51 +312,51 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Greatest depth beyond a length; 0 if nothing is inside.
-    fn depth(&self, held: f64) -> f64 {
-        self.probe.inside(self.line, held, false).map_or(0.0, |d| d.depth)
-    }
-
-    fn run(mut self) -> DepenetrateCounts {
+    /// Moves the hair out, which is `before` deep inside.
+    fn run(mut self, before: f64) -> DepenetrateCounts {
         let held = self.probe.settings.held;
-        let before = self.depth(held);
-        let mut best = (self.depth(self.held), self.stored.to_vec());
+        let mut other = Vec::new();
+        let mut best = (f64::INFINITY, self.drawn.1.clone());
+        let mut clear = false;
         for sweep in 0..SWEEPS {
             let stretch = STRETCH * (0..sweep.saturating_sub(PATIENCE)).fold(1.0, |f, _| f * YIELD);
-            let moved = self.sweep(stretch);
-            if !moved || sweep % 8 == 7 || sweep + 1 == SWEEPS {
-                let depth = self.depth(self.held);
+            let (moved, dips) = self.sweep(stretch);
+            if !moved {
+                clear = !dips;
+                break;
+            }
+            if sweep % 8 == 7 {
+                let depth = self.probe.depth(self.line, self.held, &mut other);
                 if depth < best.0 {
                     best = (depth, self.stored.to_vec());
                 }
-                if !moved {
-                    break;
-                }
             }
         }
-        // What the last sweep left is at least as good when it is clear; in a fold an earlier one may have been better.
-        self.stored.copy_from_slice(&best.1);
-        self.line.iter_mut().zip(&best.1).for_each(|(p, s)| *p = self.space.read(s));
-        let after = self.depth(held);
+        if !clear {
+            let depth = self.probe.depth(self.line, self.held, &mut other);
+            if best.0.min(before) < depth {
+                // In a fold an earlier shape may have been better, or the one that was drawn.
+                self.stored.copy_from_slice(if best.0 < before { &best.1 } else { &self.drawn.1 });
+                self.line.iter_mut().zip(&*self.stored).for_each(|(p, s)| *p = self.space.read(s));
+            }
+        }
+        let after = if clear && self.held == held { 0.0 } else { self.probe.depth(self.line, held, &mut other) };
         let far = self.line.iter().zip(&self.drawn.0).map(|(p, q)| (p - q).norm()).fold(0.0, f64::max);
         let longer = |(w, l): (&[Vec3], &f64)| if *l > 0.0 { ((w[1] - w[0]).norm() / l - 1.0).abs() } else { 0.0 };
+        let stretched = self.line.windows(2).zip(&self.length).map(longer).fold(0.0, f64::max);
         DepenetrateCounts {
             pushed: usize::from(*self.stored != *self.drawn.1),
             uncleared: usize::from(after > 0.0),
             buried: usize::from(after > 0.0 && self.held > held),
             deepest: [before, after],
             moved: far,
-            stretched: if after > 0.0 {
-                0.0
-            } else {
-                self.line.windows(2).zip(&self.length).map(longer).fold(0.0, f64::max)
-            },
+            stretched: if after > 0.0 { 0.0 } else { stretched },
         }
     }
 
-    /// Once along the hair; true if anything moved.
-    fn sweep(&mut self, stretch: f64) -> bool {
-        let (mut moved, mut before) = (false, 0.0);
+    /// Once along the hair: whether anything moved, and whether something inside could not be.
+    fn sweep(&mut self, stretch: f64) -> (bool, bool) {
+        let (mut moved, mut stuck, mut before) = (false, false, 0.0);
         for i in 0..self.length.len() {
             moved |= self.follow(i, stretch);
             let from = (self.held - before).max(0.0);
@@ -355,11 +371,13 @@ impl<'a> Job<'a> {
                 }
                 let Some(dip) = self.probe.dip(a, b, from, (b - a).norm(), &mut Ahead::UNKNOWN.clone()) else { break };
                 let way = dip.depth + self.clearance(before + dip.t * self.length[i]);
-                moved |= self.push(i, &dip, way, stretch);
+                let pushed = self.push(i, &dip, way, stretch);
+                moved |= pushed;
+                stuck |= !pushed;
             }
             before += self.length[i];
         }
-        moved
+        (moved, stuck)
     }
 
     /// Distance from the skin that a pushed hair should have at an arc length.
