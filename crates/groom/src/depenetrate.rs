@@ -21,12 +21,12 @@ use rayon::prelude::*;
 pub const STRETCH: f64 = 0.01;
 
 /// Sweeps over a hair. Convex skin takes 2 to 6; hair that is not clear after 40 is in a fold that has no room for it.
-const SWEEPS: usize = 40;
+const SWEEPS: usize = 48;
 
 /// Sweeps after which lengths yield to the skin: the stretch grows by [`YIELD`] a sweep. With fewer, hair stretches that
 /// would have found a way around; with more, hair in folds takes longer for the same.
 const PATIENCE: usize = 16;
-const YIELD: f64 = 1.15;
+const YIELD: f64 = 1.25;
 
 /// Pushes of a segment in one sweep. With 1 or 2 deep hair needs more sweeps; beyond 8 its ends go back and forth.
 const TRIES: usize = 6;

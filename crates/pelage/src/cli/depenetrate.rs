@@ -13,7 +13,7 @@ use pelage_sim::body::Closed;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Distance of samples and the length at the root that is left alone, metres.
+/// Distance of samples, metres.
 const MILLIMETRE: f64 = 1e-3;
 
 /// Diameter written for curves that come without, metres: that of the sample grooms.
@@ -33,6 +33,9 @@ pub struct DepenetrateArguments {
     /// Distance from the skin at which pushed hair ends, millimetres
     #[arg(long, default_value_t = 0.05)]
     pub clearance: f64,
+    /// Length at the root that may be inside, millimetres
+    #[arg(long, default_value_t = 1.0)]
+    pub held: f64,
     /// Metres per unit of both files, where the curves do not say
     #[arg(long)]
     pub meters_per_unit: Option<f64>,
@@ -74,14 +77,17 @@ pub fn run(a: &DepenetrateArguments) -> Result<bool, Error> {
     let unit = unit(a, &source)?;
     source.facts.meters_per_unit = unit;
     let bvh = skin(&a.skin, &mut source.warnings)?;
-    if !(a.clearance > 0.0 && a.clearance <= 10.0) {
-        return Err(Error::input(
-            format!("--clearance {}: expected millimetres, more than 0 and at most 10", a.clearance),
-            "0.05 is the radius of a thick hair",
-        ));
+    for (name, value, hint) in [
+        ("clearance", a.clearance, "0.05 is more than the radius of a hair"),
+        ("held", a.held, "as deep as the roots are sunk, 1 where they lie on the skin"),
+    ] {
+        if !(value > 0.0 && value <= 100.0) {
+            let what = format!("--{name} {value}: expected millimetres, more than 0 and at most 100");
+            return Err(Error::input(what, hint));
+        }
     }
     let mm = MILLIMETRE / unit;
-    let settings = Depenetrate { step: mm, clearance: a.clearance * mm, held: mm };
+    let settings = Depenetrate { step: mm, clearance: a.clearance * mm, held: a.held * mm };
     let drawn = source.position.clone();
     let mut counts = DepenetrateCounts::default();
     for (layer, position) in source.layers.iter().zip(&mut source.position) {
@@ -404,7 +410,7 @@ fn report(a: &DepenetrateArguments, source: &Source, counts: &DepenetrateCounts,
     }
     let mut out = format!("{hairs} hairs, {} pushed, {} still inside", counts.pushed, counts.uncleared);
     if counts.buried > 0 {
-        out.push_str(&format!(" ({} with a root too deep to get out within a millimetre)", counts.buried));
+        out.push_str(&format!(" ({} with a root too deep to get out within --held {} mm)", counts.buried, a.held));
     }
     out.push_str(&format!("\ndeepest: {before:.3} mm before, {after:.3} mm after\n"));
     let (moved, stretch) = (counts.moved / mm, 100.0 * counts.stretched);
