@@ -20,7 +20,7 @@ use rayon::prelude::*;
 /// hair looks longer than its neighbours.
 pub const STRETCH: f64 = 0.01;
 
-/// Sweeps over a hair. Convex skin takes 2 to 6; hair that is not clear after 40 is in a fold that has no room for it.
+/// Sweeps over a hair. Convex skin takes 2 to 6; hair that is not clear after 48 is in a fold that has no room for it.
 const SWEEPS: usize = 48;
 
 /// Sweeps after which lengths yield to the skin: the stretch grows by [`YIELD`] a sweep. With fewer, hair stretches that
