@@ -24,8 +24,8 @@ pub const STRETCH: f64 = 0.01;
 const SWEEPS: usize = 40;
 
 /// Sweeps after which lengths yield to the skin: the stretch grows by [`YIELD`] a sweep, to 0.22 (at 1.25 some segments
-/// end up four times as long, and no fewer hairs stay inside of an ear). With fewer, hair stretches that
-/// would have found a way around; with more, hair in folds takes longer for the same.
+/// end up four times as long, and hardly fewer hairs stay in an ear). With fewer, hair stretches that would have found a
+/// way around; with more, hair in folds takes longer for the same.
 const PATIENCE: usize = 16;
 const YIELD: f64 = 1.15;
 
