@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod command_line;
+mod depenetrate;
 mod determinism;
 mod foreign;
 mod golden;

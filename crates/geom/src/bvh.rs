@@ -4,6 +4,7 @@ use crate::mesh::corners;
 use crate::{NONE, SurfacePoint, Topology, Vec3};
 use rayon::prelude::*;
 
+mod bound;
 mod lids;
 mod ray;
 

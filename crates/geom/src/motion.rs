@@ -68,6 +68,14 @@ impl RigidTransform {
         let pivot = Vec3::from(self.pivot);
         q * (rest - pivot) + pivot + Vec3::from(self.translation)
     }
+
+    /// Takes a moved position back to the rest pose.
+    pub fn invert(&self, moved: Vec3) -> Vec3 {
+        let [x, y, z, w] = self.rotation;
+        let q = UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z));
+        let pivot = Vec3::from(self.pivot);
+        q.conjugate() * (moved - pivot - Vec3::from(self.translation)) + pivot
+    }
 }
 
 #[cfg(test)]
@@ -87,5 +95,7 @@ mod tests {
         for (t, x) in [(-1.0, 0.0), (0.0, 0.0), (2.0, 4.0), (9.0, 4.0)] {
             assert_eq!(m.at(t, [0.0; 3]).translation[0], x);
         }
+        let (t, rest) = (m.at(0.7, [3.0, -1.0, 2.0]), Vec3::new(0.3, -0.5, 1.0));
+        assert!((t.invert(t.apply(rest)) - rest).norm() < 1e-14);
     }
 }

@@ -8,6 +8,7 @@ pub mod candidates;
 mod chart_cut;
 pub mod comb;
 pub mod control;
+pub mod depenetrate;
 pub mod instance;
 pub mod interpolate;
 pub mod look;

@@ -219,3 +219,20 @@ fn slivers_lose_nothing() {
         }
     }
 }
+
+#[test]
+fn the_distance_bound_is_one_and_not_far_off() {
+    let m = sphere(48, 24, 1.0);
+    let b = bvh(&m);
+    for k in 0..2000 {
+        let q = random(k, 4.0);
+        let distance = b.closest(q, f64::INFINITY).expect("a mesh").signed_distance.abs();
+        let bound = b.distance_bound(q, f64::INFINITY);
+        assert!(bound <= distance, "{bound} of {distance}");
+        // Boxes of leaves are less than 1 across.
+        assert!(bound >= 0.5 * (distance - 1.0), "{bound} of {distance}");
+        assert_eq!(b.distance_bound(q, 0.01 * bound), 0.01 * bound);
+    }
+    assert_eq!(Bvh::default().distance_bound(Vec3::zeros(), 3.0), 3.0);
+    assert_eq!(b.distance_bound(Vec3::new(f64::NAN, 0.0, 0.0), 3.0), 0.0);
+}

@@ -2,6 +2,7 @@
 
 mod cache;
 mod compare;
+mod depenetrate;
 mod init;
 mod inspect;
 mod preview;
@@ -66,6 +67,8 @@ pub enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Push curves out of a skin
+    Depenetrate(depenetrate::DepenetrateArguments),
     /// Look after the cache
     Cache {
         /// What to do with it
@@ -217,6 +220,7 @@ pub fn execute(arguments: Arguments) -> Result<bool, Error> {
         Command::Plan(a) => run::plan(a),
         Command::Inspect { file, json } => inspect::inspect(&file, json),
         Command::Compare { a, b, tolerance, json } => compare::compare(&a, &b, tolerance, json),
+        Command::Depenetrate(a) => depenetrate::run(&a),
         Command::Cache { action } => cache::cache(action),
         Command::Schema { file } => {
             let text = match file {

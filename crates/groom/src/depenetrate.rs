@@ -1,0 +1,436 @@
+//! Depenetration: final curves that enter the skin are moved out of it.
+//!
+//! "Course notes 2003, A sparse-guide-hair model", §3.1.3: from the root on, the first penetrated vertex moves to its
+//! nearest valid location p1', and each one after it follows at its segment's length toward where it was:
+//! p2' = p1' + |p2 - p1| (p2 - p1') / |p2 - p1'|. Here
+//! * a segment may not enter along its whole length: its deepest point moves to the nearest valid location, and both ends
+//!   with it in proportion to their share of that point (the least motion that does it);
+//! * a vertex that follows need not move while its segment is within [`STRETCH`] of its length: what is left of a push
+//!   runs out along the hair, and a tip beyond it stays where it was, to the bit;
+//! * sweeps from the root repeat until nothing is inside and lengths are kept.
+//!
+//! **Inside** is decided along every segment, not at samples. Signed distance changes by at most the way gone, so nothing
+//! within d of a point at distance d is inside; where that says nothing, a ray does.
+
+use pelage_geom::motion::RigidTransform;
+use pelage_geom::{Bvh, Offsets, Vec3};
+use rayon::prelude::*;
+
+/// Part of its length by which a segment may be stretched or shortened. At 0 every push reaches the tip; at 0.05 a pushed
+/// hair looks longer than its neighbours.
+pub const STRETCH: f64 = 0.01;
+
+/// Sweeps over a hair. Convex skin takes 2 to 6; hair that is not clear after 40 is in a fold that has no room for it.
+const SWEEPS: usize = 40;
+
+/// Sweeps after which lengths yield to the skin: the stretch grows by [`YIELD`] a sweep, to 0.22 (at 1.25 some segments
+/// end up four times as long, and hardly fewer hairs stay in an ear). With fewer, hair stretches that would have found a
+/// way around; with more, hair in folds takes longer for the same.
+const PATIENCE: usize = 16;
+const YIELD: f64 = 1.15;
+
+/// Pushes of a segment in one sweep. With 1 or 2 deep hair needs more sweeps; beyond 8 its ends go back and forth.
+const TRIES: usize = 6;
+
+/// Length at the root over which a push grows to the clearance, in clearances. At 10 hair lying flat is lifted to 6
+/// degrees at its root; at 1000 none of a short hair is as clear as it should be.
+const RAMP: f64 = 100.0;
+
+/// Distance in steps beyond which a bound is asked for before the distance. At 1 both are asked for near the skin; at 20
+/// the distance is, where it is dear.
+const FAR: f64 = 4.0;
+
+/// Part of `held` down to which a root may lie in the skin for the rest of that length to be enough to get out.
+const SHALLOW: f64 = 0.75;
+
+/// Settings of [`depenetrate`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Depenetrate {
+    /// Distance of samples where hair runs along the skin or in it, scene units; 1 mm. Positive. What is inside does not
+    /// depend on it; how deep is known to within it.
+    pub step: f64,
+    /// Distance from the skin at which pushed hair ends, scene units; 0.05 mm. Positive.
+    pub clearance: f64,
+    /// Length at the root that may be inside, scene units; 1 mm. Positive.
+    pub held: f64,
+}
+
+/// What was done.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DepenetrateCounts {
+    /// Hairs that were moved.
+    pub pushed: usize,
+    /// Hairs that are still inside somewhere. Those moved have the best shape that was found.
+    pub uncleared: usize,
+    /// Of these, hairs whose root lies too deep for the held length to reach the surface.
+    pub buried: usize,
+    /// Greatest depth of a sample before and after, scene units.
+    pub deepest: [f64; 2],
+    /// Longest way that a point was moved, scene units.
+    pub moved: f64,
+    /// Greatest change of a segment's length of a hair that was cleared, as a fraction of it.
+    pub stretched: f64,
+}
+
+impl DepenetrateCounts {
+    /// Of both.
+    pub fn and(self, other: Self) -> Self {
+        DepenetrateCounts {
+            pushed: self.pushed + other.pushed,
+            uncleared: self.uncleared + other.uncleared,
+            buried: self.buried + other.buried,
+            deepest: [0, 1].map(|i| self.deepest[i].max(other.deepest[i])),
+            moved: self.moved.max(other.moved),
+            stretched: self.stretched.max(other.stretched),
+        }
+    }
+}
+
+/// Moves hairs (runs `offsets` of `position`, scene units relative to `origin`, root first) out of the skin. `bvh` is that
+/// of the skin at this moment; or that of the rest skin and `world_from_skin` its rigid motion. A skin with holes (a bust
+/// open at the neck) should have them closed with lids ([`Bvh::with_lids`]): without, the sign next to a hole is a guess.
+///
+/// Roots stay, and hairs with nothing inside beyond the held length keep every bit; hairs with a number that is not finite
+/// are left alone.
+pub fn depenetrate(
+    bvh: &Bvh,
+    settings: &Depenetrate,
+    world_from_skin: Option<&RigidTransform>,
+    offsets: &Offsets,
+    origin: [f64; 3],
+    position: &mut [[f32; 3]],
+) -> DepenetrateCounts {
+    let Depenetrate { step, clearance, held } = *settings;
+    assert!(step > 0.0 && clearance > 0.0 && held > 0.0, "step, clearance and held length are positive");
+    assert_eq!(offsets.total(), position.len(), "positions of all hairs");
+    let space = Space { motion: world_from_skin, origin: Vec3::from(origin) };
+    let mut rest = position;
+    let mut hairs = Vec::with_capacity(offsets.len());
+    for n in offsets.counts() {
+        let (hair, others) = rest.split_at_mut(n);
+        hairs.push(hair);
+        rest = others;
+    }
+    let one = |(line, open): &mut (Vec<Vec3>, Vec<bool>), stored: &mut [[f32; 3]]| {
+        line.clear();
+        line.extend(stored.iter().map(|p| space.read(p)));
+        let probe = Probe { bvh, settings };
+        // A sum that is not finite: a hair with a number that is not.
+        if !line.iter().map(Vec3::sum).sum::<f64>().is_finite() {
+            return DepenetrateCounts::default();
+        }
+        match probe.depth(line, held, open) {
+            0.0 => DepenetrateCounts::default(),
+            depth => Job::new(probe, &space, line, stored, open).run(depth),
+        }
+    };
+    let none = DepenetrateCounts::default;
+    hairs.into_par_iter().map_init(Default::default, one).reduce(none, DepenetrateCounts::and)
+}
+
+/// How stored positions lie in the space of the skin's hierarchy.
+struct Space<'a> {
+    motion: Option<&'a RigidTransform>,
+    origin: Vec3,
+}
+
+impl Space<'_> {
+    fn read(&self, p: &[f32; 3]) -> Vec3 {
+        let world = Vec3::from(p.map(f64::from)) + self.origin;
+        self.motion.map_or(world, |m| m.invert(world))
+    }
+
+    fn store(&self, p: Vec3) -> [f32; 3] {
+        let world = self.motion.map_or(p, |m| m.apply(p)) - self.origin;
+        [world.x as f32, world.y as f32, world.z as f32]
+    }
+}
+
+/// The deepest point of a segment inside the skin.
+#[derive(Clone, Copy)]
+struct Dip {
+    /// Parameter on the segment.
+    t: f64,
+    depth: f64,
+    /// Unit vector to the nearest point of the skin.
+    out: Vec3,
+}
+
+/// What is known about a hair ahead of the point reached.
+#[derive(Clone, Copy)]
+struct Ahead {
+    /// Length that is outside.
+    sure: f64,
+    /// About the distance at the last sample, negative inside.
+    last: f64,
+}
+
+impl Ahead {
+    const UNKNOWN: Ahead = Ahead { sure: 0.0, last: -1.0 };
+}
+
+/// The skin as hair asks for it.
+#[derive(Clone, Copy)]
+struct Probe<'a> {
+    bvh: &'a Bvh,
+    settings: &'a Depenetrate,
+}
+
+impl Probe<'_> {
+    /// Greatest depth beyond the arc length `held`, 0 if nothing is inside; and which segments are, into `open`.
+    fn depth(&self, line: &[Vec3], held: f64, open: &mut Vec<bool>) -> f64 {
+        open.clear();
+        let mut left: f64 = line.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
+        let (mut before, mut ahead, mut deepest) = (0.0, Ahead::UNKNOWN, 0.0f64);
+        for w in line.windows(2) {
+            let length = (w[1] - w[0]).norm();
+            let from = (held - before).max(0.0);
+            let dip = if from < length { self.dip(w[0], w[1], from, left, &mut ahead) } else { None };
+            open.push(dip.is_some());
+            deepest = deepest.max(dip.map_or(0.0, |d| d.depth));
+            before += length;
+            left -= length;
+        }
+        deepest
+    }
+
+    /// Deepest point of a segment beyond `from`. `left`: length from its beginning to where nothing matters any more.
+    fn dip(&self, a: Vec3, b: Vec3, from: f64, left: f64, ahead: &mut Ahead) -> Option<Dip> {
+        let length = (b - a).norm();
+        let mut s = from.max(ahead.sure);
+        if s >= length {
+            ahead.sure -= length;
+            return None;
+        }
+        let direction = (b - a) / length;
+        let step = self.settings.step;
+        // Distance or a lower bound of it, and the dip where it is negative.
+        let sample = |s: f64, last: f64| {
+            let at = a + direction * s;
+            // From an outside point on, only the skin within reach matters, and far out not on which side it is.
+            let limit = if last >= 0.0 { (left - s).max(0.0) + step } else { f64::INFINITY };
+            if last >= FAR * step {
+                let bound = self.bvh.distance_bound(at, limit);
+                if bound >= 0.5 * FAR * step {
+                    return (bound, None);
+                }
+            }
+            let Some(c) = self.bvh.closest(at, limit) else { return (f64::INFINITY, None) };
+            let depth = -c.signed_distance;
+            let out = (c.position - at).try_normalize(1e-6 * step).unwrap_or(c.normal);
+            (c.signed_distance, (depth > 0.0).then_some(Dip { t: s / length, depth, out }))
+        };
+        let (mut deepest, mut untested) = (None, true);
+        let (mut now, dip) = sample(s, ahead.last);
+        deeper(&mut deepest, dip);
+        loop {
+            if now >= 0.0 && s + now >= length {
+                *ahead = Ahead { sure: s + now - length, last: now };
+                return deepest;
+            }
+            if now >= 0.0 && untested {
+                untested = false;
+                // Sure up to s + now; a ray tells about the rest.
+                if self.bvh.ray(a + direction * (s + now), direction, length - s - now).is_none() {
+                    *ahead = Ahead { sure: 0.0, last: now };
+                    return deepest;
+                }
+            }
+            let end = (s + step.max(now)).min(length);
+            let (next, dip) = sample(end, now);
+            deeper(&mut deepest, dip);
+            if now >= 0.0 && next >= 0.0 && now + next < end - s {
+                // Both are outside, and what is between may not be.
+                let between = self.crossing(a + direction * s, direction, end - s).map(|t| sample(s + t, -1.0));
+                deeper(&mut deepest, between.and_then(|b| b.1));
+            }
+            if end >= length {
+                *ahead = Ahead { sure: next.max(0.0), last: next };
+                return deepest;
+            }
+            (s, now) = (end, next);
+        }
+    }
+
+    /// Middle between the first two places where a line meets the skin within `length`.
+    fn crossing(&self, from: Vec3, direction: Vec3, length: f64) -> Option<f64> {
+        let (enter, _) = self.bvh.ray(from, direction, length)?;
+        let beyond = enter + 1e-6 * length;
+        let (leave, _) = self.bvh.ray(from + direction * beyond, direction, length - beyond)?;
+        Some(0.5 * (enter + beyond + leave))
+    }
+}
+
+fn deeper(deepest: &mut Option<Dip>, dip: Option<Dip>) {
+    if dip.is_some_and(|d| deepest.is_none_or(|e| d.depth > e.depth)) {
+        *deepest = dip;
+    }
+}
+
+/// A hair that is inside.
+struct Job<'a> {
+    probe: Probe<'a>,
+    space: &'a Space<'a>,
+    /// Points in the space of the hierarchy, exactly those that are stored.
+    line: &'a mut [Vec3],
+    stored: &'a mut [[f32; 3]],
+    /// The same as they came.
+    drawn: (Vec<Vec3>, Vec<[f32; 3]>),
+    /// Lengths of segments as they came.
+    length: Vec<f64>,
+    /// Vertices that were pushed, rather than following others or staying.
+    pushed: Vec<bool>,
+    /// Segments that have moved since they were last looked at.
+    open: &'a mut Vec<bool>,
+    /// Length at the root that is left alone: more than asked for where that cannot suffice.
+    held: f64,
+    /// What a coordinate may be off by as stored, in all.
+    grain: f64,
+}
+
+impl<'a> Job<'a> {
+    fn new(
+        probe: Probe<'a>,
+        space: &'a Space<'a>,
+        line: &'a mut [Vec3],
+        stored: &'a mut [[f32; 3]],
+        open: &'a mut Vec<bool>,
+    ) -> Self {
+        let held = probe.settings.held;
+        let root = probe.bvh.closest(line[0], f64::INFINITY).map_or(0.0, |c| -c.signed_distance);
+        let largest = stored.iter().flatten().fold(0.0f32, |m, x| m.max(x.abs()));
+        Job {
+            probe,
+            space,
+            drawn: (line.to_vec(), stored.to_vec()),
+            length: line.windows(2).map(|w| (w[1] - w[0]).norm()).collect(),
+            pushed: vec![false; line.len()],
+            open,
+            held: if root > SHALLOW * held { held.max(2.0 * root) } else { held },
+            grain: f64::from(4.0 * f32::EPSILON * largest),
+            line,
+            stored,
+        }
+    }
+
+    /// Moves the hair out, which is `before` deep inside.
+    fn run(mut self, before: f64) -> DepenetrateCounts {
+        let held = self.probe.settings.held;
+        let mut other = Vec::new();
+        let mut best = (f64::INFINITY, self.drawn.1.clone());
+        let mut clear = false;
+        for sweep in 0..SWEEPS {
+            let stretch = STRETCH * (0..sweep.saturating_sub(PATIENCE)).fold(1.0, |f, _| f * YIELD);
+            let (moved, dips) = self.sweep(stretch);
+            if !moved {
+                clear = !dips;
+                break;
+            }
+            if sweep % 8 == 7 {
+                let depth = self.probe.depth(self.line, self.held, &mut other);
+                if depth < best.0 {
+                    best = (depth, self.stored.to_vec());
+                }
+            }
+        }
+        if !clear {
+            let depth = self.probe.depth(self.line, self.held, &mut other);
+            if best.0.min(before) < depth {
+                // In a fold an earlier shape may have been better, or the one that was drawn.
+                self.stored.copy_from_slice(if best.0 < before { &best.1 } else { &self.drawn.1 });
+                self.line.iter_mut().zip(&*self.stored).for_each(|(p, s)| *p = self.space.read(s));
+            }
+        }
+        let after = if clear && self.held == held { 0.0 } else { self.probe.depth(self.line, held, &mut other) };
+        let far = self.line.iter().zip(&self.drawn.0).map(|(p, q)| (p - q).norm()).fold(0.0, f64::max);
+        let longer = |(w, l): (&[Vec3], &f64)| if *l > 0.0 { ((w[1] - w[0]).norm() / l - 1.0).abs() } else { 0.0 };
+        let stretched = self.line.windows(2).zip(&self.length).map(longer).fold(0.0, f64::max);
+        DepenetrateCounts {
+            pushed: usize::from(*self.stored != *self.drawn.1),
+            uncleared: usize::from(after > 0.0),
+            buried: usize::from(after > 0.0 && self.held > held),
+            deepest: [before, after],
+            moved: far,
+            stretched: if after > 0.0 { 0.0 } else { stretched },
+        }
+    }
+
+    /// Once along the hair: whether anything moved, and whether something inside could not be.
+    fn sweep(&mut self, stretch: f64) -> (bool, bool) {
+        let (mut moved, mut stuck, mut before) = (false, false, 0.0);
+        for i in 0..self.length.len() {
+            moved |= self.follow(i, stretch);
+            let from = (self.held - before).max(0.0);
+            for _ in 0..TRIES {
+                if !self.open[i] {
+                    break;
+                }
+                self.open[i] = false;
+                let (a, b) = (self.line[i], self.line[i + 1]);
+                if from >= (b - a).norm() {
+                    break;
+                }
+                let Some(dip) = self.probe.dip(a, b, from, (b - a).norm(), &mut Ahead::UNKNOWN.clone()) else { break };
+                let way = dip.depth + self.clearance(before + dip.t * self.length[i]);
+                let pushed = self.push(i, &dip, way, stretch);
+                moved |= pushed;
+                stuck |= !pushed;
+            }
+            before += self.length[i];
+        }
+        (moved, stuck)
+    }
+
+    /// Distance from the skin that a pushed hair should have at an arc length.
+    fn clearance(&self, s: f64) -> f64 {
+        let clearance = self.probe.settings.clearance;
+        clearance * (s / (RAMP * clearance)).min(1.0)
+    }
+
+    /// Moves the end of segment `i` toward where it was (where it was pushed to) as far as the segment's length allows.
+    fn follow(&mut self, i: usize, stretch: f64) -> bool {
+        let k = i + 1;
+        let target = if self.pushed[k] { self.line[k] } else { self.drawn.0[k] };
+        let (way, length) = (target - self.line[i], self.length[i]);
+        let (r, slack) = (way.norm(), stretch * length + self.grain);
+        if (r - length).abs() <= slack {
+            return self.place(k, target);
+        }
+        let drawn = self.drawn.0[k] - self.drawn.0[i];
+        let direction = way.try_normalize(1e-12 * length).or_else(|| drawn.try_normalize(0.0));
+        // A little less than allowed, so that rounding does not make it more.
+        let to = length + (0.9 * slack).copysign(r - length);
+        direction.is_some_and(|d| self.place(k, self.line[i] + d * to))
+    }
+
+    /// Moves a segment so that its deepest point goes `way` out: both ends by their weights of that point, which is the
+    /// least motion in the sum of squares; the end alone where the segment begins at the root.
+    fn push(&mut self, i: usize, dip: &Dip, way: f64, stretch: f64) -> bool {
+        let (a, b) = if i == 0 { (0.0, dip.t) } else { (1.0 - dip.t, dip.t) };
+        let whole = way / (a * a + b * b);
+        let mut moved = false;
+        for (k, weight) in [(i, a), (i + 1, b)] {
+            if weight > 1e-9 {
+                moved |= self.place(k, self.line[k] + dip.out * (whole * weight));
+                self.pushed[k] = true;
+            }
+        }
+        moved |= self.follow(i, stretch);
+        moved
+    }
+
+    /// Puts a vertex somewhere, as exactly as it can be stored; true if it moved.
+    fn place(&mut self, k: usize, p: Vec3) -> bool {
+        let stored = if p == self.drawn.0[k] { self.drawn.1[k] } else { self.space.store(p) };
+        if stored == self.stored[k] || !stored.iter().all(|x| x.is_finite()) {
+            return false;
+        }
+        self.stored[k] = stored;
+        self.line[k] = self.space.read(&stored);
+        self.open[k - 1] = true;
+        if let Some(open) = self.open.get_mut(k) {
+            *open = true;
+        }
+        true
+    }
+}
