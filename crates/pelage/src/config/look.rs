@@ -477,13 +477,15 @@ pub struct WindLook {
 pub struct Collision {
     /// Do it. Default: true.
     pub enabled: bool,
-    /// Distance that pushed hairs keep from the skin, millimetres. Default: 0.1.
+    /// Distance from the skin at which pushed hairs end, millimetres. Default: 0.05.
     pub clearance: f64,
+    /// Length at the root that may be inside, millimetres. Default: 1.
+    pub held: f64,
 }
 
 impl Default for Collision {
     fn default() -> Self {
-        Collision { enabled: true, clearance: 0.1 }
+        Collision { enabled: true, clearance: 0.05, held: 1.0 }
     }
 }
 
@@ -751,7 +753,8 @@ impl Document<GroomFile> {
             self.within(&format!("{at}.frequency"), w.frequency, 0.0, 1e3)?;
             self.within(&format!("{at}.gust"), w.gust, 0.0, 1.0)?;
         }
-        self.within(&format!("{at}.collision.clearance"), l.collision.clearance, 0.0, 1e3)?;
+        self.within(&format!("{at}.collision.clearance"), l.collision.clearance, 1e-4, 1e3)?;
+        self.within(&format!("{at}.collision.held"), l.collision.held, 1e-4, 1e6)?;
         self.check_order(at, l)
     }
 

@@ -9,8 +9,9 @@ use crate::Error;
 use crate::config::{self, CurlKind, LookValue, WaveShape};
 use crate::format::HairLayer;
 use crate::project::SkinAt;
-use pelage_geom::{NONE, Vec3, rng};
+use pelage_geom::{Bvh, NONE, Offsets, Vec3, rng};
 use pelage_groom::along::scaled;
+use pelage_groom::depenetrate::{Depenetrate, depenetrate};
 use pelage_groom::instance::Roots;
 use pelage_groom::look::axes::{RootAxes, carried, rest_axes};
 use pelage_groom::look::clump::{Clump, bind_lines, centre_lines, clump, dilations, drawn_lines, wet};
@@ -22,6 +23,7 @@ use pelage_groom::look::vary::{Drawn, factors, shifts};
 use pelage_groom::look::wave::{Axis, RootVariable, Shape, Stations, Waves, root_variable, wave};
 use pelage_groom::look::wind::{Wind, wind};
 use pelage_groom::look::{Param, perlin};
+use pelage_sim::body::Closed;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
@@ -93,15 +95,49 @@ pub fn finish(
     Ok(out)
 }
 
+/// A skin with its holes closed, and the structure over its rest pose.
+#[derive(Debug)]
+pub struct Barrier {
+    closed: Closed,
+    rest: Bvh,
+}
+
 /// Pushes finished hairs out of the skin.
 fn collide(
-    _run: &mut Runner<'_>,
-    _i: usize,
-    _at: &SkinAt,
-    _pose: &SkinPose,
-    _position: &mut [[f32; 3]],
-    _counts: &mut Counts,
+    run: &mut Runner<'_>,
+    i: usize,
+    at: &SkinAt,
+    pose: &SkinPose,
+    position: &mut [[f32; 3]],
+    counts: &mut Counts,
 ) -> Result<(), Error> {
+    let skin = groom::skin(run)?;
+    let barrier = match &run.barrier {
+        Some(found) => found.clone(),
+        None => {
+            let closed = Closed::new(&skin.mesh, &skin.topology);
+            let rest = closed.bvh(&closed.extend(&skin.mesh.position));
+            run.barrier.insert(Rc::new(Barrier { closed, rest })).clone()
+        }
+    };
+    let posed;
+    let (bvh, motion) = match at {
+        SkinAt::Rest => (&barrier.rest, None),
+        SkinAt::Rigid(t) => (&barrier.rest, Some(t)),
+        SkinAt::File(_) => {
+            posed = barrier.closed.bvh(&barrier.closed.extend(&pose.position));
+            (&posed, None)
+        }
+    };
+    let c = run.project.groom.value.layer[i].collision;
+    let millimetre = 1e-3 / run.project.shot.value.shot.meters_per_unit;
+    let settings =
+        Depenetrate { step: millimetre, clearance: c.clearance * millimetre, held: c.held * millimetre };
+    let points = run.project.points(i);
+    let offsets = Offsets::uniform(position.len() / points, points);
+    let found = depenetrate(bvh, &settings, motion, &offsets, skin.origin(), position);
+    counts.insert("hairs pushed out of the skin".to_owned(), found.pushed as u64);
+    counts.insert("hairs still in the skin".to_owned(), found.uncleared as u64);
     Ok(())
 }
 

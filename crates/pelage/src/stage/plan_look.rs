@@ -160,10 +160,11 @@ impl Plan {
         }
         let collides = last && collides(r.project, i);
         if collides {
-            let at = format!("layer[{i}].collision.clearance");
-            let clearance = r.project.groom.value.layer[i].collision.clearance;
-            recipe = r.unit(r.rest(recipe)).param("clearance", clearance, r.in_groom(&at));
-            recipe = recipe.param("collision", version::COLLISION, "collision");
+            let c = r.project.groom.value.layer[i].collision;
+            recipe = r.unit(r.rest(recipe)).param("collision", version::COLLISION, "collision");
+            for (key, x) in [("clearance", c.clearance), ("held", c.held)] {
+                recipe = recipe.param(key, x, r.in_groom(&format!("layer[{i}].collision.{key}")));
+            }
         }
         if last && r.project.points(i) != r.project.base_points(i) {
             let at = format!("layer[{i}].points");
