@@ -6,6 +6,7 @@
 //! every frame the axes turn no more than the hair does, and a hair that moves as a whole takes them along.
 
 use super::V3;
+use super::lanes::{Block, F, LANES, V, below};
 use pelage_geom::{Mesh, Pose, SurfacePoint, Topology, Vec3};
 use rayon::prelude::*;
 
@@ -61,7 +62,85 @@ pub fn carried(mesh: &Mesh, topology: &Topology, now: &Pose, root: &[SurfacePoin
     root.par_iter().zip(local).map(carry).collect()
 }
 
-/// Axes at the points of one hair, used again from hair to hair.
+/// Axes at the points of hairs side by side, used again from block to block.
+#[derive(Debug, Default)]
+pub(crate) struct Beside {
+    /// Unit tangents.
+    pub tangent: Vec<V>,
+    /// x axes.
+    pub normal: Vec<V>,
+    /// y axes.
+    pub binormal: Vec<V>,
+    /// Length of the hairs up to each point.
+    pub arc: Vec<F>,
+}
+
+impl Beside {
+    /// Sets arc lengths only.
+    pub fn set_arc(&mut self, hairs: &Block) {
+        self.arc.clear();
+        let mut arc = F::splat(0.0);
+        self.arc.push(arc);
+        for w in hairs.point.windows(2) {
+            let d = w[1] - w[0];
+            arc += d.dot(d).sqrt();
+            self.arc.push(arc);
+        }
+    }
+
+    /// Sets tangents, axes and arc lengths: what [`Along::set`] does, lane by lane. `root` has the axes of the lanes' roots.
+    pub fn set(&mut self, hairs: &Block, root: [&RootAxes; LANES]) {
+        let (zero, one) = (F::splat(0.0), F::splat(1.0));
+        self.arc.clear();
+        self.tangent.clear();
+        self.normal.clear();
+        self.binormal.clear();
+        self.arc.push(zero);
+        let mut before = V::gather(|l| root[l].tangent);
+        let (mut t0, mut x, mut arc) = (before, V::gather(|l| root[l].normal), zero);
+        let last = hairs.point.len() - 1;
+        for k in 0..=last {
+            let mut t = before;
+            if k < last {
+                let d = hairs.point[k + 1] - hairs.point[k];
+                let n = d.dot(d).sqrt();
+                arc += n;
+                self.arc.push(arc);
+                t = d.times(one / n).or(below(zero, n), before);
+            }
+            // A point's tangent halves the angle between its segments.
+            let sum = before + t;
+            let n2 = sum.dot(sum);
+            let between = k > 0 && k < last;
+            let here = if between { sum.times(one / n2.sqrt()).or(below(F::splat(1e-8), n2), t) } else { t };
+            before = t;
+            x = turned_lanes(x, t0, here);
+            t0 = here;
+            self.tangent.push(here);
+            self.normal.push(x);
+            self.binormal.push(here.cross(x));
+        }
+    }
+}
+
+/// [`turned`] in lanes.
+#[inline(always)]
+fn turned_lanes(x: V, from: V, to: V) -> V {
+    let cosine = from.dot(to);
+    let y = x - (from + to).times(x.dot(to) / (F::splat(1.0) + cosine));
+    let y = y - to.times(y.dot(to));
+    let y = y.times(F::splat(1.5) - F::splat(0.5) * y.dot(y));
+    let folded = below(cosine, F::splat(FOLDED));
+    if !folded.any() {
+        return y;
+    }
+    let across = x - to.times(x.dot(to));
+    let n = across.dot(across).sqrt();
+    let other = across.times(F::splat(1.0) / n).or(below(F::splat(1e-3), n), x);
+    other.or(folded, y)
+}
+
+/// Axes at the points of one hair, used again from hair to hair: the plain form of [`Beside`].
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Along {
     /// Unit tangents.
@@ -171,6 +250,28 @@ mod tests {
             a.set(&line, &r);
             b.set(&moved, &moved_root);
             assert!(a.normal.iter().zip(&b.normal).all(|(x, y)| (turn * x - y).norm() < 1e-5));
+        }
+    }
+
+    #[test]
+    fn hairs_side_by_side_have_the_axes_of_each() {
+        let mut all: Vec<[f32; 3]> = (0..3).flat_map(|s| hair(s, 30)).collect();
+        // One hair folds back on itself and stands still in between.
+        all.extend((0..30).map(|k| [[0.0, 1.0, 1.0, 0.0][k % 4], 0.0, 0.0]));
+        let roots: Vec<RootAxes> = all.chunks_exact(30).map(root).collect();
+        let mut block = Block::default();
+        block.load(30, &all);
+        let mut beside = Beside::default();
+        beside.set(&block, [&roots[0], &roots[1], &roots[2], &roots[3]]);
+        for l in 0..4 {
+            let mut one = Along::default();
+            one.set(&all[l * 30..][..30], &roots[l]);
+            let lane = |v: &V| V3::new(v.0[0].to_array()[l], v.0[1].to_array()[l], v.0[2].to_array()[l]);
+            for k in 0..30 {
+                assert!((lane(&beside.tangent[k]) - one.tangent[k]).norm() < 1e-5, "{l} {k}");
+                assert!((lane(&beside.normal[k]) - one.normal[k]).norm() < 1e-4, "{l} {k}");
+                assert!((beside.arc[k].to_array()[l] - one.arc[k]).abs() < 1e-4);
+            }
         }
     }
 

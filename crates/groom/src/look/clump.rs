@@ -8,7 +8,6 @@
 //! smooth.
 
 use super::{CHUNK, Param, V3, at_station, lengths, relay, station_weights};
-use crate::look::turn::sin_cos_turn;
 use pelage_geom::rng::{channel, uniform};
 use pelage_geom::{NONE, StrandId};
 use rayon::prelude::*;
@@ -136,7 +135,7 @@ fn wind_around(hair: &mut [[f32; 3]], line: &[[f32; 3]], turns: f32) {
         if n == 0.0 {
             continue;
         }
-        let (sin, cos) = sin_cos_turn(turns * k as f32 / last as f32);
+        let (sin, cos) = libm::sincosf(std::f32::consts::TAU * turns * k as f32 / last as f32);
         let (axis, q) = (along / n, V3::from(line[k]));
         let o = V3::from(hair[k]) - q;
         hair[k] = (q + o * cos + axis.cross(&o) * sin + axis * (axis.dot(&o) * (1.0 - cos))).into();

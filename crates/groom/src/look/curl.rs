@@ -4,9 +4,9 @@
 //! `Mag(t) = A + B t exp(-alpha t) + C (1 - exp(-beta t)) + D exp(gamma (t - t0))`, one for each of the two axes across the
 //! hair; t is the arc length. As printed the function does not vanish at the root: it is faded in there.
 
-use super::axes::{Along, RootAxes};
-use super::turn::sin_cos_turn;
-use super::{CHUNK, Param, V3, lengths};
+use super::axes::{Beside, RootAxes};
+use super::lanes::{Block, F, LANES, below, sin_cos_turn};
+use super::{CHUNK, Param, lanes};
 use crate::along::at_points;
 use rayon::prelude::*;
 
@@ -58,14 +58,17 @@ impl Wave {
         m
     }
 
-    /// Wave at arc length `t`, its phase `phase` turns ahead, its frequency growing by `tighten` at the tip, at `tip`.
+    /// Wave at arc length `t`, its phase `phase` turns ahead, its frequency growing by `tighten` a pitch.
     #[inline(always)]
-    fn at(&self, t: f32, phase: f32, tighten: f32) -> f32 {
+    fn at(&self, t: F, phase: F, tighten: F) -> F {
         if *self == Wave::NONE {
-            return 0.0;
+            return F::splat(0.0);
         }
-        let turns = (self.r * t + self.p0 * (1.0 + tighten * t)) * t + self.phase + phase;
-        self.magnitude(t) * sin_cos_turn(turns).0 + self.bias
+        let of = F::splat;
+        let turns = (of(self.r) * t + of(self.p0) * (of(1.0) + tighten * t)) * t + of(self.phase) + phase;
+        let only_a = self.b == 0.0 && self.c == 0.0 && self.d == 0.0;
+        let magnitude = if only_a { of(self.a) } else { F::from(t.to_array().map(|t| self.magnitude(t))) };
+        magnitude * sin_cos_turn(turns).0 + of(self.bias)
     }
 
     /// No offset.
@@ -120,110 +123,173 @@ pub fn curl(points: usize, c: &Curl, position: &mut [[f32; 3]]) {
     let profile = at_points(c.profile, points);
     position.par_chunks_mut(CHUNK * points).enumerate().for_each(|(chunk, out)| {
         let mut s = Scratch::default();
-        for (h, hair) in (chunk * CHUNK..).zip(out.chunks_exact_mut(points)) {
-            let own = Own::new(c, h);
-            if own.radius == 0.0 || own.pitch <= 0.0 {
+        for (b, hairs) in out.chunks_mut(LANES * points).enumerate() {
+            let lane = lanes(chunk * CHUNK + b * LANES, hairs.len() / points);
+            let own = Own::new(c, lane, &profile);
+            let active: [bool; LANES] = lane.map(|h| c.radius.of(h) != 0.0 && c.pitch.of(h) > 0.0);
+            if active == [false; LANES] {
                 continue;
             }
-            if !c.keep_length {
-                own.displace(c, h, &profile, hair, &mut s.along);
-                continue;
+            s.block.load(points, hairs);
+            if c.keep_length {
+                own.curl_keeping(&mut s, points, hairs);
+            } else {
+                s.along.set(&s.block, own.root);
+                own.displace(&s.along, &mut s.block);
             }
-            s.spine.clear();
-            s.spine.extend_from_slice(hair);
-            lengths(hair, &mut s.length);
-            let total: f32 = s.length.iter().sum();
-            own.displace(c, h, &profile, hair, &mut s.along);
-            // Cut the middle line until the curled hair is as long as the straight one was.
-            let (mut share, mut curled) = (1.0f32, arc_length(hair));
-            for _ in 0..SHORTENINGS {
-                if !curled.is_finite() || (curled - total).abs() <= total * CLOSE {
-                    break;
-                }
-                share = (share * total / curled).min(1.0);
-                shortened(&s.spine, &s.length, share * total, hair);
-                own.displace(c, h, &profile, hair, &mut s.along);
-                curled = arc_length(hair);
-            }
-            if curled > 0.0 {
-                let (root, scale) = (hair[0], total / curled);
-                let from_root = |p: &[f32; 3]| std::array::from_fn(|x| root[x] + (p[x] - root[x]) * scale);
-                hair[1..].iter_mut().for_each(|p| *p = from_root(p));
-            }
+            s.block.store(points, active, hairs);
         }
     });
 }
 
-fn arc_length(hair: &[[f32; 3]]) -> f32 {
-    hair.windows(2).map(|w| (V3::from(w[1]) - V3::from(w[0])).norm()).sum()
-}
+/// Relative error of length that is left to the end, where hairs are scaled about their roots: this much of a radius does
+/// not show.
+const CLOSE: f32 = 5e-3;
 
-/// Rounds of shortening: each leaves about a tenth of the error before it.
-const SHORTENINGS: usize = 4;
-
-/// Relative error of length that is left to the last step, which scales the hair about its root: a thousandth does not
-/// show in a radius.
-const CLOSE: f32 = 1e-3;
+/// Times that a hair is curled at most: again only where bends of its middle line made it longer or shorter than reckoned
+/// for a straight one.
+const TRIES: usize = 3;
 
 #[derive(Default)]
 struct Scratch {
-    along: Along,
-    spine: Vec<[f32; 3]>,
-    length: Vec<f32>,
+    along: Beside,
+    block: Block,
+    cut: Vec<[f32; 3]>,
 }
 
-/// The first `length` of a polyline, its points in the same shares.
-fn shortened(spine: &[[f32; 3]], segment: &[f32], length: f32, out: &mut [[f32; 3]]) {
-    let total: f32 = segment.iter().sum();
-    let (mut k, mut arc, mut target) = (0, 0.0f32, 0.0f32);
-    for i in 1..out.len() {
-        target += segment[i - 1] * (length / total);
-        while k + 1 < segment.len() && arc + segment[k] < target {
-            arc += segment[k];
-            k += 1;
-        }
-        let t = if segment[k] > 0.0 { (target - arc) / segment[k] } else { 0.0 };
-        out[i] = std::array::from_fn(|x| spine[k][x] + (spine[k + 1][x] - spine[k][x]) * t);
-    }
+/// Parameters of hairs side by side.
+struct Own<'a> {
+    curl: &'a Curl<'a>,
+    root: [&'a RootAxes; LANES],
+    profile: &'a [f32],
+    radius: F,
+    per_unit: F,
+    phase: F,
+    tighten: F,
+    plane: (F, F),
 }
 
-/// Parameters of one hair.
-struct Own {
-    radius: f32,
-    pitch: f32,
-    phase: f32,
-    angle: f32,
-    tighten: f32,
-}
-
-impl Own {
-    fn new(c: &Curl, h: usize) -> Self {
+impl<'a> Own<'a> {
+    fn new(c: &'a Curl<'a>, lane: [usize; LANES], profile: &'a [f32]) -> Self {
+        let of = |p: &Param| F::from(lane.map(|h| p.of(h)));
         Own {
-            radius: c.radius.of(h),
-            pitch: c.pitch.of(h),
-            phase: c.phase.of(h),
-            angle: c.angle.of(h),
-            tighten: c.tighten.of(h),
+            curl: c,
+            root: lane.map(|h| &c.axes[h]),
+            profile,
+            radius: of(&c.radius),
+            per_unit: F::splat(1.0) / of(&c.pitch),
+            phase: of(&c.phase),
+            tighten: of(&c.tighten),
+            plane: sin_cos_turn(of(&c.angle)),
         }
     }
 
-    /// Adds the offsets to a hair.
-    fn displace(&self, c: &Curl, h: usize, profile: &[f32], hair: &mut [[f32; 3]], along: &mut Along) {
-        along.set(hair, &c.axes[h]);
-        let per_unit = 1.0 / self.pitch;
-        let tip = along.arc[hair.len() - 1] * per_unit;
-        let tighten = if tip > 0.0 { 0.5 * self.tighten / tip } else { 0.0 };
-        let (sin, cos) = sin_cos_turn(self.angle);
-        let rise = if c.start > 0.0 { 1.0 / c.start } else { f32::INFINITY };
-        for k in 1..hair.len() {
-            let t = along.arc[k] * per_unit;
-            let f = (t * rise).min(1.0);
-            let size = self.radius * f * f * (3.0 - 2.0 * f) * profile.get(k).unwrap_or(&1.0);
-            let x = size * c.wave[0].at(t, self.phase, tighten);
-            let y = size * c.wave[1].at(t, self.phase, tighten);
-            let (u, v) = (x * cos - y * sin, x * sin + y * cos);
-            let (n, b) = (along.normal[k], along.tangent[k].cross(&along.normal[k]));
-            hair[k] = (V3::from(hair[k]) + n * u + b * v).into();
+    /// Growth of the frequency a pitch, for hairs of that length.
+    fn tightening(&self, length: F) -> F {
+        let tip = length * self.per_unit;
+        let share = F::splat(0.5) * self.tighten / tip;
+        F::splat(0.0).max(share).min(F::splat(f32::MAX))
+    }
+
+    /// Offsets along the two axes at point `k`, at arc length `arc`.
+    #[inline(always)]
+    fn offset(&self, k: usize, arc: F, tighten: F) -> [F; 2] {
+        let (one, t) = (F::splat(1.0), arc * self.per_unit);
+        let c = self.curl;
+        let f = if c.start > 0.0 { (t * F::splat(1.0 / c.start)).fast_min(one) } else { one };
+        let size = self.radius * f * f * (F::splat(3.0) - f - f) * F::splat(*self.profile.get(k).unwrap_or(&1.0));
+        let x = size * c.wave[0].at(t, self.phase, tighten);
+        let y = size * c.wave[1].at(t, self.phase, tighten);
+        let (sin, cos) = self.plane;
+        [x * cos - y * sin, x * sin + y * cos]
+    }
+
+    /// Adds the offsets to hairs whose axes are `along`.
+    fn displace(&self, along: &Beside, hairs: &mut Block) {
+        let tighten = self.tightening(along.arc[hairs.point.len() - 1]);
+        for (k, p) in hairs.point.iter_mut().enumerate().skip(1) {
+            let [u, v] = self.offset(k, along.arc[k], tighten);
+            *p = *p + along.normal[k].times(u) + along.binormal[k].times(v);
+        }
+    }
+
+    /// Length of curled hairs whose middle line is straight and ends at a share of itself.
+    fn reckoned(&self, arc: &[F], share: F) -> F {
+        let tighten = self.tightening(arc[arc.len() - 1] * share);
+        let (mut sum, mut before, mut at) = (F::splat(0.0), [F::splat(0.0); 2], F::splat(0.0));
+        for (k, arc) in arc.iter().enumerate().skip(1) {
+            let (o, t) = (self.offset(k, *arc * share, tighten), *arc * share);
+            let [dx, dy, dz] = [o[0] - before[0], o[1] - before[1], t - at];
+            sum += (dx * dx + dy * dy + dz * dz).sqrt();
+            (before, at) = (o, t);
+        }
+        sum
+    }
+
+    /// Share of the middle line at which curled hairs are as long as it is, reckoned as if it were straight: the length is
+    /// nearly linear in the share, so the line through two shares finds it (to 1e-3 for curls that fade in over a tenth of
+    /// the hair).
+    fn share(&self, arc: &[F], total: F) -> F {
+        let one = F::splat(1.0);
+        let whole = self.reckoned(arc, one);
+        let first = within_one(total / whole);
+        let less = self.reckoned(arc, first);
+        let slope = (whole - less) / (one - first);
+        let second = first + (total - less) / slope;
+        // No curls: no slope.
+        within_one(below(first, F::splat(0.999_9)).bitselect(second, first))
+    }
+
+    /// Curls hairs so that they stay as long as they are: their middle lines end earlier.
+    fn curl_keeping(&self, s: &mut Scratch, points: usize, hairs: &[[f32; 3]]) {
+        s.along.set_arc(&s.block);
+        let arc = std::mem::take(&mut s.along.arc);
+        let total = arc[points - 1];
+        let mut share = self.share(&arc, total);
+        let mut curled = total;
+        for _ in 0..TRIES {
+            cut(points, hairs, &arc, share, &mut s.cut);
+            s.block.load(points, &s.cut);
+            s.along.set(&s.block, self.root);
+            self.displace(&s.along, &mut s.block);
+            curled = s.block.length();
+            let off = ((curled - total) / total).abs();
+            if !below(F::splat(CLOSE), off).any() {
+                break;
+            }
+            share = within_one(share * total / curled);
+        }
+        let one = F::splat(1.0);
+        s.along.arc = arc;
+        let scale = below(F::splat(0.0), curled).bitselect(total / curled, one);
+        let root = s.block.point[0];
+        s.block.point.iter_mut().for_each(|p| *p = root + (*p - root).times(scale));
+    }
+}
+
+/// A share of 0 to 1; 1 for what is none.
+fn within_one(share: F) -> F {
+    below(F::splat(0.0), share).bitselect(share.fast_min(F::splat(1.0)), F::splat(1.0))
+}
+
+/// The first `share` of each hair, its points in the same shares of its length. `arc` has the length up to each point.
+fn cut(points: usize, hairs: &[[f32; 3]], arc: &[F], share: F, out: &mut Vec<[f32; 3]>) {
+    out.clear();
+    let share = share.to_array();
+    for (l, hair) in hairs.chunks_exact(points).enumerate() {
+        let share = share[l];
+        let arc = |k: usize| arc[k].as_array()[l];
+        let mut k = 0;
+        out.push(hair[0]);
+        for i in 1..points {
+            let target = arc(i) * share;
+            while k + 2 < points && arc(k + 1) < target {
+                k += 1;
+            }
+            let side = arc(k + 1) - arc(k);
+            let t = if side > 0.0 { ((target - arc(k)) / side).min(1.0) } else { 0.0 };
+            let (a, b) = (hair[k], hair[k + 1]);
+            out.push([a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t, a[2] + (b[2] - a[2]) * t]);
         }
     }
 }

@@ -1,13 +1,15 @@
 //! Noise and frizz: random offsets across the hair, smooth along it.
 
-use super::axes::{Along, RootAxes};
-use super::perlin::{key, perlin1, perlin3};
-use super::{CHUNK, Param, V3, lengths, relay};
+use super::axes::{Beside, RootAxes};
+use super::lanes::{Block, F, LANES, V, perlin1, perlin3};
+use super::perlin::key;
+use super::{CHUNK, Param, lanes};
 use pelage_geom::StrandId;
 use crate::along::at_points;
 use rayon::prelude::*;
+use wide::u32x4;
 
-/// Root mean square of [`perlin1`].
+/// Root mean square of [`super::perlin::perlin1`].
 const RMS1: f32 = 0.281_39;
 
 /// The way through noise in space that a hair takes: no lattice direction, so that no two of its cells are alike.
@@ -43,35 +45,39 @@ pub fn noise(points: usize, n: &Noise, position: &mut [[f32; 3]]) {
     let profile = at_points(n.profile, points);
     let of_all = key(n.seed, 0, n.channel);
     let per_unit = 1.0 / n.size;
+    let way = V([F::splat(WAY[0]), F::splat(WAY[1]), F::splat(WAY[2])]);
+    let (one, three) = (F::splat(1.0), F::splat(3.0));
     position.par_chunks_mut(CHUNK * points).enumerate().for_each(|(chunk, out)| {
-        let (mut along, mut length) = (Along::default(), Vec::new());
-        for (h, hair) in (chunk * CHUNK..).zip(out.chunks_exact_mut(points)) {
-            let amplitude = n.amplitude.of(h);
-            if amplitude == 0.0 {
+        let (mut along, mut block) = (Beside::default(), Block::default());
+        for (b, hairs) in out.chunks_mut(LANES * points).enumerate() {
+            let lane = lanes(chunk * CHUNK + b * LANES, hairs.len() / points);
+            let amplitude = lane.map(|h| n.amplitude.of(h));
+            if amplitude == [0.0; LANES] {
                 continue;
             }
-            along.set(hair, &n.axes[h]);
-            if n.keep_length {
-                lengths(hair, &mut length);
-            }
-            let own = key(n.seed, n.id[h], n.channel);
-            let root = n.root[h].map(|x| x / n.across);
+            block.load(points, hairs);
+            along.set(&block, lane.map(|h| &n.axes[h]));
+            let own = u32x4::from(lane.map(|h| key(n.seed, n.id[h], n.channel)));
+            let root = V::gather(|l| n.root[lane[l]].map(|x| x / n.across));
+            let amplitude_of = F::from(amplitude);
             for k in 1..points {
-                let t = along.arc[k] * per_unit;
-                let f = t.min(1.0);
-                let size = amplitude * f * f * (3.0 - 2.0 * f) * profile.get(k).unwrap_or(&1.0);
+                let t = along.arc[k] * F::splat(per_unit);
+                let f = t.fast_min(one);
+                let size = amplitude_of * f * f * (three - f - f) * F::splat(*profile.get(k).unwrap_or(&1.0));
                 let [x, y] = if n.across > 0.0 {
-                    perlin3(of_all, std::array::from_fn(|x| root[x] + WAY[x] * t))
+                    perlin3(of_all, root + way.times(t))
                 } else {
                     // Half a cell apart, so that they are not both 0 at the same places.
-                    [perlin1(own, t), perlin1(!own, t + 0.5)].map(|v| v * (1.0 / RMS1))
+                    let (x, y) = (perlin1(own, t), perlin1(!own, t + F::splat(0.5)));
+                    [x * F::splat(1.0 / RMS1), y * F::splat(1.0 / RMS1)]
                 };
-                let (a, b) = (along.normal[k], along.tangent[k].cross(&along.normal[k]));
-                hair[k] = (V3::from(hair[k]) + a * (size * x) + b * (size * y)).into();
+                let offset = along.normal[k].times(size * x) + along.binormal[k].times(size * y);
+                block.point[k] = block.point[k] + offset;
             }
             if n.keep_length {
-                relay(hair, &length);
+                block.relay(&along.arc);
             }
+            block.store(points, amplitude.map(|a| a != 0.0), hairs);
         }
     });
 }

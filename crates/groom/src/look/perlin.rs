@@ -2,7 +2,7 @@
 //! SIGGRAPH 2002), keyed: slopes are hashes of a key and the lattice point.
 
 /// Root mean square of [`perlin3`] before it is scaled to 1, measured over a million points.
-const RMS3: f32 = 0.1969;
+pub(super) const RMS3: f32 = 0.1969;
 
 /// Mixes 32 bits (C. Wellons' "lowbias32").
 #[inline(always)]

@@ -15,8 +15,11 @@ pub fn refine(from: usize, to: usize, position: &[[f32; 3]]) -> Vec<[f32; 3]> {
         for (hair, old) in out.chunks_exact_mut(to).zip(position.chunks_exact(from)) {
             let root = V3::from(old[0]);
             for (p, row) in hair.iter_mut().zip(&rows) {
-                let from_root = |(s, w): &(usize, f32)| (V3::from(old[*s]) - root) * *w;
-                *p = (root + row.iter().map(from_root).sum::<V3>()).into();
+                let mut sum = V3::zeros();
+                for (s, w) in row {
+                    sum += (V3::from(old[*s]) - root) * *w;
+                }
+                *p = (root + sum).into();
             }
             lengths(old, &mut length);
             let step = length.iter().sum::<f32>() / (to - 1) as f32;

@@ -6,14 +6,15 @@
 //! the root; T, for which the paper names no fifth value, is there what it is at the first station. Each station's value is
 //! `mean + deviation random(scale r)` with Perlin's noise for `random` (13 to 15), so random(0) = 0.
 
-use super::axes::{Along, RootAxes};
+use super::axes::{Beside, RootAxes};
+use super::lanes::{Block, F, LANES, gather, perlin1 as lanes_perlin1, sin_cos_turn};
 use super::perlin::{key, perlin1, perlin3};
-use super::turn::sin_cos_turn;
 use super::vary::Drawn;
-use super::{CHUNK, Param, V3, at_station, lengths, relay, station_weights};
+use super::{CHUNK, Param, lanes, station_weights};
 use pelage_geom::TiledMap;
 use pelage_geom::rng::{channel, uniform};
 use rayon::prelude::*;
+use wide::u32x4;
 
 /// A value at four stations as a function of the root variable.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -113,30 +114,31 @@ pub fn wave(points: usize, w: &Waves, position: &mut [[f32; 3]]) {
     let names: [[u32; 3]; 2] =
         std::array::from_fn(|a| [name("amplitude", a), name("frequency", a), name("phase", a)]);
     position.par_chunks_mut(CHUNK * points).enumerate().for_each(|(chunk, out)| {
-        let (mut along, mut length) = (Along::default(), Vec::new());
-        for (h, hair) in (chunk * CHUNK..).zip(out.chunks_exact_mut(points)) {
-            let strength = w.strength.of(h);
-            if strength == 0.0 {
+        let (mut along, mut block) = (Beside::default(), Block::default());
+        for (b, hairs) in out.chunks_mut(LANES * points).enumerate() {
+            let lane = lanes(chunk * CHUNK + b * LANES, hairs.len() / points);
+            let own: [[Own; LANES]; 2] = std::array::from_fn(|a| {
+                lane.map(|h| Own::new(&w.axis[a], names[a], w.r[h], w.strength.of(h)))
+            });
+            let still = |l: usize| own[0][l].amplitude == [0.0; 5] && own[1][l].amplitude == [0.0; 5];
+            let active: [bool; LANES] = std::array::from_fn(|l| !still(l));
+            if active == [false; LANES] {
                 continue;
             }
-            let own: [Own; 2] = std::array::from_fn(|a| Own::new(&w.axis[a], names[a], w.r[h], strength));
-            if own.iter().all(|o| o.amplitude == [0.0; 5]) {
-                continue;
-            }
-            along.set(hair, &w.axes[h]);
-            if w.keep_length {
-                lengths(hair, &mut length);
-            }
-            let total = along.arc[points - 1];
+            let own = own.map(OwnLanes::new);
+            block.load(points, hairs);
+            along.set(&block, lane.map(|h| &w.axes[h]));
+            let total = along.arc[points - 1].fast_max(F::splat(f32::MIN_POSITIVE));
             for k in 1..points {
-                let l = if total > 0.0 { along.arc[k] / total } else { 0.0 };
-                let [x, y] = [0, 1].map(|a| own[a].at(w.shape, names[a][2], &stations[k], l));
-                let (n, b) = (along.normal[k], along.tangent[k].cross(&along.normal[k]));
-                hair[k] = (V3::from(hair[k]) + n * x + b * y).into();
+                let l = along.arc[k] / total;
+                let x = own[0].at(w.shape, names[0][2], &stations[k], l);
+                let y = own[1].at(w.shape, names[1][2], &stations[k], l);
+                block.point[k] = block.point[k] + along.normal[k].times(x) + along.binormal[k].times(y);
             }
             if w.keep_length {
-                relay(hair, &length);
+                block.relay(&along.arc);
             }
+            block.store(points, active, hairs);
         }
     });
 }
@@ -159,14 +161,38 @@ impl Own {
             phase: mean + deviation * perlin1(phase, r * scale),
         }
     }
+}
+
+/// [`Own`] in lanes.
+struct OwnLanes {
+    amplitude: [F; 5],
+    frequency: [F; 5],
+    phase: F,
+}
+
+impl OwnLanes {
+    fn new(own: [Own; LANES]) -> Self {
+        OwnLanes {
+            amplitude: std::array::from_fn(|s| gather(|l| own[l].amplitude[s])),
+            frequency: std::array::from_fn(|s| gather(|l| own[l].frequency[s])),
+            phase: gather(|l| own[l].phase),
+        }
+    }
 
     #[inline(always)]
-    fn at(&self, shape: Shape, key: u32, stations: &[f32], l: f32) -> f32 {
-        let a = at_station(stations, &self.amplitude);
-        let turns = self.phase + at_station(stations, &self.frequency) * l;
-        a * match shape {
+    fn at(&self, shape: Shape, key: u32, stations: &[f32], l: F) -> F {
+        let sum = |v: &[F; 5]| {
+            let mut sum = F::splat(0.0);
+            for (v, w) in v.iter().zip(stations) {
+                sum += *v * F::splat(*w);
+            }
+            sum
+        };
+        let turns = self.phase + sum(&self.frequency) * l;
+        let wave = match shape {
             Shape::Sine => sin_cos_turn(turns).0,
-            Shape::Noise => perlin1(key ^ 0x5bd1_e995, turns),
-        }
+            Shape::Noise => lanes_perlin1(u32x4::splat(key ^ 0x5bd1_e995), turns),
+        };
+        sum(&self.amplitude) * wave
     }
 }

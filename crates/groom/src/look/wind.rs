@@ -1,8 +1,10 @@
 //! Wind without simulation: a noise moves the points of hairs (production-pipeline paper §4.3), more toward the tip, and
 //! their lengths stay.
 
-use super::perlin::{key, perlin3};
-use super::{CHUNK, Param, V3, lengths, relay};
+use super::axes::Beside;
+use super::lanes::{Block, F, LANES, V, perlin3};
+use super::perlin::key;
+use super::{CHUNK, Param, V3, lanes};
 use rayon::prelude::*;
 
 /// How far a gust at a hair's tip is behind one at its root, in gusts: bends run along the hair. At 0 hair moves as a
@@ -44,22 +46,28 @@ pub fn wind(points: usize, w: &Wind, position: &mut [[f32; 3]]) {
     let noise = key(w.seed, 0, w.channel);
     // Gusts travel with the wind (frozen turbulence): one of their size passes in 1 / frequency.
     let gone = along * (f64::from(w.frequency) * w.time) as f32;
+    let all = |v: V3| V([F::splat(v.x), F::splat(v.y), F::splat(v.z)]);
+    let (down, side, gone) = (all(along), all(across), all(gone));
     position.par_chunks_mut(CHUNK * points).enumerate().for_each(|(chunk, out)| {
-        let mut length = Vec::new();
-        for (h, hair) in (chunk * CHUNK..).zip(out.chunks_exact_mut(points)) {
-            let amplitude = w.amplitude.of(h);
-            if amplitude == 0.0 {
+        let (mut arc, mut block) = (Beside::default(), Block::default());
+        for (b, hairs) in out.chunks_mut(LANES * points).enumerate() {
+            let lane = lanes(chunk * CHUNK + b * LANES, hairs.len() / points);
+            let amplitude = lane.map(|h| w.amplitude.of(h));
+            if amplitude == [0.0; LANES] {
                 continue;
             }
-            lengths(hair, &mut length);
-            let here = V3::from(w.root[h]) / w.size - gone;
-            for (k, p) in hair.iter_mut().enumerate().skip(1) {
-                let l = k as f32 / (points - 1) as f32;
-                let [a, b] = perlin3(noise, (here - along * (LAG * l)).into());
-                let push = along * (1.0 + w.gust * a) + across * (0.5 * w.gust * b);
-                *p = (V3::from(*p) + push * (amplitude * l * l)).into();
+            block.load(points, hairs);
+            arc.set_arc(&block);
+            let here = V::gather(|l| w.root[lane[l]].map(|x| x / w.size)) - gone;
+            for k in 1..points {
+                let l = F::splat(k as f32 / (points - 1) as f32);
+                let [a, b] = perlin3(noise, here - down.times(l * F::splat(LAG)));
+                let size = F::from(amplitude) * l * l;
+                let push = down.times(size * (F::splat(1.0) + a * F::splat(w.gust)));
+                block.point[k] = block.point[k] + push + side.times(size * b * F::splat(0.5 * w.gust));
             }
-            relay(hair, &length);
+            block.relay(&arc.arc);
+            block.store(points, amplitude.map(|a| a != 0.0), hairs);
         }
     });
 }

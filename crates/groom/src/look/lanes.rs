@@ -1,0 +1,268 @@
+//! Four hairs at a time, one a lane: the same arithmetic in every lane, so the same bytes as one by one.
+
+use std::ops::{Add, Sub};
+use wide::bytemuck;
+use wide::{f32x4, i32x4, u32x4};
+
+/// Hairs that are handled together.
+pub(crate) const LANES: usize = 4;
+
+pub(crate) type F = f32x4;
+
+/// A vector in every lane.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct V(pub [F; 3]);
+
+impl Add for V {
+    type Output = V;
+    #[inline(always)]
+    fn add(self, o: V) -> V {
+        V([self.0[0] + o.0[0], self.0[1] + o.0[1], self.0[2] + o.0[2]])
+    }
+}
+
+impl Sub for V {
+    type Output = V;
+    #[inline(always)]
+    fn sub(self, o: V) -> V {
+        V([self.0[0] - o.0[0], self.0[1] - o.0[1], self.0[2] - o.0[2]])
+    }
+}
+
+impl V {
+    /// A vector for every lane.
+    #[inline(always)]
+    pub fn gather(of: impl Fn(usize) -> [f32; 3]) -> V {
+        let [a, b, c, d] = [of(0), of(1), of(2), of(3)];
+        V([F::from([a[0], b[0], c[0], d[0]]), F::from([a[1], b[1], c[1], d[1]]), F::from([a[2], b[2], c[2], d[2]])])
+    }
+
+    #[inline(always)]
+    pub fn times(self, s: F) -> V {
+        V([self.0[0] * s, self.0[1] * s, self.0[2] * s])
+    }
+
+    #[inline(always)]
+    pub fn dot(self, o: V) -> F {
+        self.0[0] * o.0[0] + self.0[1] * o.0[1] + self.0[2] * o.0[2]
+    }
+
+    #[inline(always)]
+    pub fn cross(self, o: V) -> V {
+        let ([a, b, c], [x, y, z]) = (self.0, o.0);
+        V([b * z - c * y, c * x - a * z, a * y - b * x])
+    }
+
+    /// `self` where `mask` is set, else `other`.
+    #[inline(always)]
+    pub fn or(self, mask: F, other: V) -> V {
+        let ([a, b, c], [x, y, z]) = (self.0, other.0);
+        V([mask.bitselect(a, x), mask.bitselect(b, y), mask.bitselect(c, z)])
+    }
+}
+
+/// A number for every lane.
+#[inline(always)]
+pub(crate) fn gather(of: impl Fn(usize) -> f32) -> F {
+    F::from([of(0), of(1), of(2), of(3)])
+}
+
+/// Largest magnitude whose whole part is taken: beyond it single precision has hardly a fraction.
+const WHOLE: f32 = 4e6;
+
+/// Whole part, as an integer and as a number; 0 for what is not a number.
+#[inline(always)]
+fn floor(x: F) -> (i32x4, F) {
+    let x = x.fast_max(F::splat(-WHOLE)).fast_min(F::splat(WHOLE));
+    let cut = x.fast_trunc_int();
+    let near = F::from_i32x4(cut);
+    // All bits set is -1.
+    let down: i32x4 = bytemuck::cast(near.simd_gt(x));
+    let whole = cut + down;
+    (whole, F::from_i32x4(whole))
+}
+
+/// (sin, cos) of `2 pi x`, error below 2e-7 for small x. Only additions and products: the same on every machine.
+#[inline(always)]
+pub(crate) fn sin_cos_turn(x: F) -> (F, F) {
+    // Quarter turn and what is left, within an eighth of a turn.
+    let (q, quarter) = floor(x * F::splat(4.0) + F::splat(0.5));
+    let a = (x - quarter * F::splat(0.25)) * F::splat(std::f32::consts::TAU);
+    let a2 = a * a;
+    let c = |v: f32| F::splat(v);
+    let s = a
+        * (c(1.0)
+            + a2 * (c(-1.0 / 6.0) + a2 * (c(1.0 / 120.0) + a2 * (c(-1.0 / 5040.0) + a2 * c(1.0 / 362_880.0)))));
+    let k = c(1.0) + a2 * (c(-0.5) + a2 * (c(1.0 / 24.0) + a2 * (c(-1.0 / 720.0) + a2 * c(1.0 / 40_320.0))));
+    let odd: F = bytemuck::cast((q & i32x4::splat(1)).simd_eq(i32x4::splat(1)));
+    let (sin, cos) = (odd.bitselect(k, s), odd.bitselect(s, k));
+    let sign = |q: i32x4| -> F { bytemuck::cast((q & i32x4::splat(2)) << 30) };
+    (sin ^ sign(q), cos ^ sign(q + i32x4::splat(1)))
+}
+
+#[inline(always)]
+fn mix(x: u32x4) -> u32x4 {
+    let x = (x ^ (x >> 16)) * u32x4::splat(0x7feb_352d);
+    let x = (x ^ (x >> 15)) * u32x4::splat(0x846c_a68b);
+    x ^ (x >> 16)
+}
+
+#[inline(always)]
+fn fade(t: F) -> F {
+    t * t * t * (t * (t * F::splat(6.0) - F::splat(15.0)) + F::splat(10.0))
+}
+
+/// [`super::perlin::perlin1`] with a key for every lane.
+#[inline(always)]
+pub(crate) fn perlin1(key: u32x4, x: F) -> F {
+    let (i, whole) = floor(x);
+    let t = x - whole;
+    let slope = |i: i32x4| {
+        let hash: i32x4 = bytemuck::cast(mix(key ^ (bytemuck::cast::<i32x4, u32x4>(i) * u32x4::splat(0x9e37_79b9))));
+        F::from_i32x4(hash) * F::splat(1.0 / 2_147_483_648.0)
+    };
+    let (a, b) = (slope(i) * t, slope(i + i32x4::splat(1)) * (t - F::splat(1.0)));
+    F::splat(2.0) * (a + (b - a) * fade(t))
+}
+
+/// [`super::perlin::perlin3`].
+#[inline(always)]
+pub(crate) fn perlin3(key: u32, p: V) -> [F; 2] {
+    let one = F::splat(1.0);
+    let [(i, wx), (j, wy), (k, wz)] = [floor(p.0[0]), floor(p.0[1]), floor(p.0[2])];
+    let t = [p.0[0] - wx, p.0[1] - wy, p.0[2] - wz];
+    let w = [fade(t[0]), fade(t[1]), fade(t[2])];
+    let (i, j, k): (u32x4, u32x4, u32x4) = (bytemuck::cast(i), bytemuck::cast(j), bytemuck::cast(k));
+    // What the sides of the cell share is hashed once.
+    let next = u32x4::splat(1);
+    let (p, q, r) = (u32x4::splat(0x9e37_79b9), u32x4::splat(0x85eb_ca77), u32x4::splat(0xc2b2_ae3d));
+    let half = |z: u32x4| (z << 16) | (z >> 16);
+    let xs = [i * p, (i + next) * p];
+    let ys = [mix(j * q), mix((j + next) * q)];
+    let zs = [half(k * r), half((k + next) * r)];
+    let side = [[one - w[0], w[0]], [one - w[1], w[1]], [one - w[2], w[2]]];
+    let from = [[t[0], t[0] - one], [t[1], t[1] - one], [t[2], t[2] - one]];
+    let mut sum = [F::splat(0.0); 2];
+    for corner in 0..8 {
+        let (x, y, z) = (corner & 1, (corner >> 1) & 1, corner >> 2);
+        let hash = mix(u32x4::splat(key) ^ xs[x] ^ ys[y] ^ zs[z]);
+        let weight = side[0][x] * side[1][y] * side[2][z];
+        let slope = |shift: u32| {
+            let bits: i32x4 = bytemuck::cast((hash >> shift) & u32x4::splat(31));
+            F::from_i32x4(bits) * F::splat(1.0 / 15.5) - one
+        };
+        let (dx, dy, dz) = (from[0][x], from[1][y], from[2][z]);
+        sum[0] += weight * (slope(0) * dx + slope(5) * dy + slope(10) * dz);
+        sum[1] += weight * (slope(15) * dx + slope(20) * dy + slope(25) * dz);
+    }
+    let scale = F::splat(1.0 / super::perlin::RMS3);
+    [sum[0] * scale, sum[1] * scale]
+}
+
+/// Hairs side by side: point k of all lanes.
+#[derive(Debug, Default)]
+pub(crate) struct Block {
+    pub point: Vec<V>,
+}
+
+impl Block {
+    /// Takes up to four hairs of `points` points; lanes without a hair repeat the last.
+    pub fn load(&mut self, points: usize, hairs: &[[f32; 3]]) {
+        let last = hairs.len() / points - 1;
+        let at: [&[[f32; 3]]; LANES] = std::array::from_fn(|l| &hairs[l.min(last) * points..][..points]);
+        self.point.clear();
+        self.point.extend((0..points).map(|k| V::gather(|l| at[l][k])));
+    }
+
+    /// Writes back the hairs whose lane is `active`; roots stay.
+    pub fn store(&self, points: usize, active: [bool; LANES], hairs: &mut [[f32; 3]]) {
+        for (hair, l) in hairs.chunks_exact_mut(points).zip(0..LANES).filter(|(_, l)| active[*l]) {
+            for (p, v) in hair.iter_mut().zip(&self.point).skip(1) {
+                *p = [v.0[0].as_array()[l], v.0[1].as_array()[l], v.0[2].as_array()[l]];
+            }
+        }
+    }
+
+    /// Lengths of the hairs.
+    pub fn length(&self) -> F {
+        let mut sum = F::splat(0.0);
+        for w in self.point.windows(2) {
+            let d = w[1] - w[0];
+            sum += d.dot(d).sqrt();
+        }
+        sum
+    }
+
+    /// Lays hairs out again from their roots with the segment lengths that `arc` (the length up to each point) says; a
+    /// segment without a direction keeps the one before it.
+    pub fn relay(&mut self, arc: &[F]) {
+        let mut before = self.point[0];
+        let (mut at, mut last) = (before, V::default());
+        for k in 1..self.point.len() {
+            let d = self.point[k] - before;
+            let n = d.dot(d).sqrt();
+            let moves = n.simd_gt(F::splat(0.0));
+            last = d.times(F::splat(1.0) / n).or(moves, last);
+            before = self.point[k];
+            at = at + last.times(arc[k] - arc[k - 1]);
+            self.point[k] = at;
+        }
+    }
+}
+
+/// `a` below `b`, as a mask.
+#[inline(always)]
+pub(crate) fn below(a: F, b: F) -> F {
+    a.simd_lt(b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::perlin;
+    use super::*;
+
+    #[test]
+    fn sine_and_cosine_are_those_of_the_library() {
+        for i in -4000..4000 {
+            let x: [f32; 4] = std::array::from_fn(|l| i as f32 * 0.002_37 + l as f32 * 0.1);
+            let (s, c) = sin_cos_turn(F::from(x));
+            for (l, x) in x.iter().enumerate() {
+                let a = f64::from(*x) * std::f64::consts::TAU;
+                let off = (f64::from(s.to_array()[l]) - libm::sin(a)).abs() + (f64::from(c.to_array()[l]) - libm::cos(a)).abs();
+                assert!(off < 2e-6, "{x}");
+            }
+        }
+        let (s, c) = sin_cos_turn(F::from([0.0, 1e30, f32::INFINITY, f32::NAN]));
+        assert_eq!((s.to_array()[0], c.to_array()[0]), (0.0, 1.0));
+    }
+
+    #[test]
+    fn noise_in_lanes_is_noise_one_by_one() {
+        for i in 0..2000u64 {
+            let r = |k: u64| (pelage_geom::rng::uniform(2, i, k, 0) * 60.0 - 30.0) as f32;
+            let key: [u32; 4] = std::array::from_fn(|l| perlin::key(1, i, l as u64));
+            let x: [f32; 4] = std::array::from_fn(|l| r(l as u64));
+            let one = perlin1(u32x4::from(key), F::from(x)).to_array();
+            assert!((0..4).all(|l| one[l] == perlin::perlin1(key[l], x[l])), "{x:?}");
+            let p: [[f32; 3]; 4] = std::array::from_fn(|l| std::array::from_fn(|x| r((4 + 3 * l + x) as u64)));
+            let three = perlin3(key[0], V::gather(|l| p[l])).map(|v| v.to_array());
+            for l in 0..4 {
+                let plain = perlin::perlin3(key[0], p[l]);
+                assert!((three[0][l] - plain[0]).abs() < 1e-5 && (three[1][l] - plain[1]).abs() < 1e-5);
+            }
+        }
+    }
+
+    #[test]
+    fn a_block_gives_back_what_it_took() {
+        let hairs: Vec<[f32; 3]> = (0..15).map(|i| [i as f32, 1.0, -0.0]).collect();
+        let mut block = Block::default();
+        block.load(5, &hairs);
+        let mut out = vec![[9.0; 3]; 15];
+        block.store(5, [true, false, true, true], &mut out);
+        assert!(out[1..5] == hairs[1..5] && out[11..] == hairs[11..] && out[5..10].iter().all(|p| *p == [9.0; 3]));
+        let arc: Vec<F> = (0..5).map(|k| F::splat(2.0 * k as f32)).collect();
+        block.relay(&arc);
+        assert!(block.length().to_array().iter().all(|l| (l - 8.0).abs() < 1e-5));
+    }
+}
