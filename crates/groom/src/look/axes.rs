@@ -255,15 +255,15 @@ mod tests {
 
     #[test]
     fn hairs_side_by_side_have_the_axes_of_each() {
-        let mut all: Vec<[f32; 3]> = (0..3).flat_map(|s| hair(s, 30)).collect();
+        let mut all: Vec<[f32; 3]> = (0..7).flat_map(|s| hair(s, 30)).collect();
         // One hair folds back on itself and stands still in between.
         all.extend((0..30).map(|k| [[0.0, 1.0, 1.0, 0.0][k % 4], 0.0, 0.0]));
         let roots: Vec<RootAxes> = all.chunks_exact(30).map(root).collect();
         let mut block = Block::default();
         block.load(30, &all);
         let mut beside = Beside::default();
-        beside.set(&block, [&roots[0], &roots[1], &roots[2], &roots[3]]);
-        for l in 0..4 {
+        beside.set(&block, std::array::from_fn(|l| &roots[l]));
+        for l in 0..LANES {
             let mut one = Along::default();
             one.set(&all[l * 30..][..30], &roots[l]);
             let lane = |v: &V| V3::new(v.0[0].to_array()[l], v.0[1].to_array()[l], v.0[2].to_array()[l]);

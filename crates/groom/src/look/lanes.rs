@@ -1,13 +1,14 @@
-//! Four hairs at a time, one a lane: the same arithmetic in every lane, so the same bytes as one by one.
+//! Eight hairs at a time, one a lane: the same arithmetic in every lane, so the same bytes as one by one.
 
 use std::ops::{Add, Sub};
 use wide::bytemuck;
-use wide::{f32x4, i32x4, u32x4};
+use wide::{f32x8, u32x8};
 
 /// Hairs that are handled together.
-pub(crate) const LANES: usize = 4;
+pub(crate) const LANES: usize = 8;
 
-pub(crate) type F = f32x4;
+pub(crate) type F = f32x8;
+pub(crate) type U = u32x8;
 
 /// A vector in every lane.
 #[derive(Clone, Copy, Debug, Default)]
@@ -33,8 +34,9 @@ impl V {
     /// A vector for every lane.
     #[inline(always)]
     pub fn gather(of: impl Fn(usize) -> [f32; 3]) -> V {
-        let [a, b, c, d] = [of(0), of(1), of(2), of(3)];
-        V([F::from([a[0], b[0], c[0], d[0]]), F::from([a[1], b[1], c[1], d[1]]), F::from([a[2], b[2], c[2], d[2]])])
+        let v = [of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7)];
+        let all = |x: usize| F::from([v[0][x], v[1][x], v[2][x], v[3][x], v[4][x], v[5][x], v[6][x], v[7][x]]);
+        V([all(0), all(1), all(2)])
     }
 
     #[inline(always)]
@@ -64,22 +66,25 @@ impl V {
 /// A number for every lane.
 #[inline(always)]
 pub(crate) fn gather(of: impl Fn(usize) -> f32) -> F {
-    F::from([of(0), of(1), of(2), of(3)])
+    F::from([of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7)])
 }
 
 /// Largest magnitude whose whole part is taken: beyond it single precision has hardly a fraction.
 const WHOLE: f32 = 4e6;
 
-/// Whole part, as an integer and as a number; 0 for what is not a number.
+/// 1.5 times 2^23: what is added to it is rounded to a whole number, which its last bits then hold.
+const ROUND: f32 = 12_582_912.0;
+
+/// Whole part, as the bits of an integer and as a number; nothing useful for what is not a number.
 #[inline(always)]
-fn floor(x: F) -> (i32x4, F) {
+fn floor(x: F) -> (U, F) {
     let x = x.fast_max(F::splat(-WHOLE)).fast_min(F::splat(WHOLE));
-    let cut = x.fast_trunc_int();
-    let near = F::from_i32x4(cut);
+    let shifted = x + F::splat(ROUND);
+    let near = shifted - F::splat(ROUND);
+    let above = near.simd_gt(x);
     // All bits set is -1.
-    let down: i32x4 = bytemuck::cast(near.simd_gt(x));
-    let whole = cut + down;
-    (whole, F::from_i32x4(whole))
+    let whole = bytemuck::cast::<F, U>(shifted) - U::splat(ROUND.to_bits()) + bytemuck::cast::<F, U>(above);
+    (whole, near - (above & F::splat(1.0)))
 }
 
 /// (sin, cos) of `2 pi x`, error below 2e-7 for small x. Only additions and products: the same on every machine.
@@ -94,16 +99,16 @@ pub(crate) fn sin_cos_turn(x: F) -> (F, F) {
         * (c(1.0)
             + a2 * (c(-1.0 / 6.0) + a2 * (c(1.0 / 120.0) + a2 * (c(-1.0 / 5040.0) + a2 * c(1.0 / 362_880.0)))));
     let k = c(1.0) + a2 * (c(-0.5) + a2 * (c(1.0 / 24.0) + a2 * (c(-1.0 / 720.0) + a2 * c(1.0 / 40_320.0))));
-    let odd: F = bytemuck::cast((q & i32x4::splat(1)).simd_eq(i32x4::splat(1)));
+    let odd: F = bytemuck::cast(U::splat(0) - (q & U::splat(1)));
     let (sin, cos) = (odd.bitselect(k, s), odd.bitselect(s, k));
-    let sign = |q: i32x4| -> F { bytemuck::cast((q & i32x4::splat(2)) << 30) };
-    (sin ^ sign(q), cos ^ sign(q + i32x4::splat(1)))
+    let sign = |q: U| -> F { bytemuck::cast((q & U::splat(2)) << 30) };
+    (sin ^ sign(q), cos ^ sign(q + U::splat(1)))
 }
 
 #[inline(always)]
-fn mix(x: u32x4) -> u32x4 {
-    let x = (x ^ (x >> 16)) * u32x4::splat(0x7feb_352d);
-    let x = (x ^ (x >> 15)) * u32x4::splat(0x846c_a68b);
+fn mix(x: U) -> U {
+    let x = (x ^ (x >> 16)) * U::splat(0x7feb_352d);
+    let x = (x ^ (x >> 15)) * U::splat(0x846c_a68b);
     x ^ (x >> 16)
 }
 
@@ -114,14 +119,16 @@ fn fade(t: F) -> F {
 
 /// [`super::perlin::perlin1`] with a key for every lane.
 #[inline(always)]
-pub(crate) fn perlin1(key: u32x4, x: F) -> F {
+pub(crate) fn perlin1(key: U, x: F) -> F {
     let (i, whole) = floor(x);
     let t = x - whole;
-    let slope = |i: i32x4| {
-        let hash: i32x4 = bytemuck::cast(mix(key ^ (bytemuck::cast::<i32x4, u32x4>(i) * u32x4::splat(0x9e37_79b9))));
-        F::from_i32x4(hash) * F::splat(1.0 / 2_147_483_648.0)
+    // A number from 1 to 2 of which the hash gives the fraction.
+    let slope = |i: U| {
+        let hash = mix(key ^ (i * U::splat(0x9e37_79b9)));
+        let unit: F = bytemuck::cast((hash >> 9) | U::splat(0x3f80_0000));
+        unit * F::splat(2.0) - F::splat(3.0)
     };
-    let (a, b) = (slope(i) * t, slope(i + i32x4::splat(1)) * (t - F::splat(1.0)));
+    let (a, b) = (slope(i) * t, slope(i + U::splat(1)) * (t - F::splat(1.0)));
     F::splat(2.0) * (a + (b - a) * fade(t))
 }
 
@@ -132,11 +139,10 @@ pub(crate) fn perlin3(key: u32, p: V) -> [F; 2] {
     let [(i, wx), (j, wy), (k, wz)] = [floor(p.0[0]), floor(p.0[1]), floor(p.0[2])];
     let t = [p.0[0] - wx, p.0[1] - wy, p.0[2] - wz];
     let w = [fade(t[0]), fade(t[1]), fade(t[2])];
-    let (i, j, k): (u32x4, u32x4, u32x4) = (bytemuck::cast(i), bytemuck::cast(j), bytemuck::cast(k));
     // What the sides of the cell share is hashed once.
-    let next = u32x4::splat(1);
-    let (p, q, r) = (u32x4::splat(0x9e37_79b9), u32x4::splat(0x85eb_ca77), u32x4::splat(0xc2b2_ae3d));
-    let half = |z: u32x4| (z << 16) | (z >> 16);
+    let next = U::splat(1);
+    let (p, q, r) = (U::splat(0x9e37_79b9), U::splat(0x85eb_ca77), U::splat(0xc2b2_ae3d));
+    let half = |z: U| (z << 16) | (z >> 16);
     let xs = [i * p, (i + next) * p];
     let ys = [mix(j * q), mix((j + next) * q)];
     let zs = [half(k * r), half((k + next) * r)];
@@ -145,15 +151,15 @@ pub(crate) fn perlin3(key: u32, p: V) -> [F; 2] {
     let mut sum = [F::splat(0.0); 2];
     for corner in 0..8 {
         let (x, y, z) = (corner & 1, (corner >> 1) & 1, corner >> 2);
-        let hash = mix(u32x4::splat(key) ^ xs[x] ^ ys[y] ^ zs[z]);
+        let hash = mix(U::splat(key) ^ xs[x] ^ ys[y] ^ zs[z]);
         let weight = side[0][x] * side[1][y] * side[2][z];
-        let slope = |shift: u32| {
-            let bits: i32x4 = bytemuck::cast((hash >> shift) & u32x4::splat(31));
-            F::from_i32x4(bits) * F::splat(1.0 / 15.5) - one
+        let slope = |bits: U| {
+            let unit: F = bytemuck::cast((bits & U::splat(31 << 18)) | U::splat(0x3f80_0000));
+            (unit - F::splat(1.484_375)) * F::splat(2.064_516_1)
         };
         let (dx, dy, dz) = (from[0][x], from[1][y], from[2][z]);
-        sum[0] += weight * (slope(0) * dx + slope(5) * dy + slope(10) * dz);
-        sum[1] += weight * (slope(15) * dx + slope(20) * dy + slope(25) * dz);
+        sum[0] += weight * (slope(hash << 18) * dx + slope(hash << 13) * dy + slope(hash << 8) * dz);
+        sum[1] += weight * (slope(hash << 3) * dx + slope(hash >> 2) * dy + slope(hash >> 7) * dz);
     }
     let scale = F::splat(1.0 / super::perlin::RMS3);
     [sum[0] * scale, sum[1] * scale]
@@ -224,7 +230,7 @@ mod tests {
     #[test]
     fn sine_and_cosine_are_those_of_the_library() {
         for i in -4000..4000 {
-            let x: [f32; 4] = std::array::from_fn(|l| i as f32 * 0.002_37 + l as f32 * 0.1);
+            let x: [f32; LANES] = std::array::from_fn(|l| i as f32 * 0.002_37 + l as f32 * 0.1);
             let (s, c) = sin_cos_turn(F::from(x));
             for (l, x) in x.iter().enumerate() {
                 let a = f64::from(*x) * std::f64::consts::TAU;
@@ -232,7 +238,7 @@ mod tests {
                 assert!(off < 2e-6, "{x}");
             }
         }
-        let (s, c) = sin_cos_turn(F::from([0.0, 1e30, f32::INFINITY, f32::NAN]));
+        let (s, c) = sin_cos_turn(F::from([0.0, 1e30, f32::INFINITY, f32::NAN, 0.0, 0.0, 0.0, 0.0]));
         assert_eq!((s.to_array()[0], c.to_array()[0]), (0.0, 1.0));
     }
 
@@ -240,13 +246,13 @@ mod tests {
     fn noise_in_lanes_is_noise_one_by_one() {
         for i in 0..2000u64 {
             let r = |k: u64| (pelage_geom::rng::uniform(2, i, k, 0) * 60.0 - 30.0) as f32;
-            let key: [u32; 4] = std::array::from_fn(|l| perlin::key(1, i, l as u64));
-            let x: [f32; 4] = std::array::from_fn(|l| r(l as u64));
-            let one = perlin1(u32x4::from(key), F::from(x)).to_array();
-            assert!((0..4).all(|l| one[l] == perlin::perlin1(key[l], x[l])), "{x:?}");
-            let p: [[f32; 3]; 4] = std::array::from_fn(|l| std::array::from_fn(|x| r((4 + 3 * l + x) as u64)));
+            let key: [u32; LANES] = std::array::from_fn(|l| perlin::key(1, i, l as u64));
+            let x: [f32; LANES] = std::array::from_fn(|l| r(l as u64));
+            let one = perlin1(U::from(key), F::from(x)).to_array();
+            assert!((0..LANES).all(|l| one[l] == perlin::perlin1(key[l], x[l])), "{x:?}");
+            let p: [[f32; 3]; LANES] = std::array::from_fn(|l| std::array::from_fn(|x| r((8 + 3 * l + x) as u64)));
             let three = perlin3(key[0], V::gather(|l| p[l])).map(|v| v.to_array());
-            for l in 0..4 {
+            for l in 0..LANES {
                 let plain = perlin::perlin3(key[0], p[l]);
                 assert!((three[0][l] - plain[0]).abs() < 1e-5 && (three[1][l] - plain[1]).abs() < 1e-5);
             }
@@ -259,7 +265,9 @@ mod tests {
         let mut block = Block::default();
         block.load(5, &hairs);
         let mut out = vec![[9.0; 3]; 15];
-        block.store(5, [true, false, true, true], &mut out);
+        let mut active = [true; LANES];
+        active[1] = false;
+        block.store(5, active, &mut out);
         assert!(out[1..5] == hairs[1..5] && out[11..] == hairs[11..] && out[5..10].iter().all(|p| *p == [9.0; 3]));
         let arc: Vec<F> = (0..5).map(|k| F::splat(2.0 * k as f32)).collect();
         block.relay(&arc);

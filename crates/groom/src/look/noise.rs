@@ -1,13 +1,12 @@
 //! Noise and frizz: random offsets across the hair, smooth along it.
 
 use super::axes::{Beside, RootAxes};
-use super::lanes::{Block, F, LANES, V, perlin1, perlin3};
+use super::lanes::{Block, F, LANES, U, V, perlin1, perlin3};
 use super::perlin::key;
 use super::{CHUNK, Param, lanes};
 use pelage_geom::StrandId;
 use crate::along::at_points;
 use rayon::prelude::*;
-use wide::u32x4;
 
 /// Root mean square of [`super::perlin::perlin1`].
 const RMS1: f32 = 0.281_39;
@@ -57,7 +56,7 @@ pub fn noise(points: usize, n: &Noise, position: &mut [[f32; 3]]) {
             }
             block.load(points, hairs);
             along.set(&block, lane.map(|h| &n.axes[h]));
-            let own = u32x4::from(lane.map(|h| key(n.seed, n.id[h], n.channel)));
+            let own = U::from(lane.map(|h| key(n.seed, n.id[h], n.channel)));
             let root = V::gather(|l| n.root[lane[l]].map(|x| x / n.across));
             let amplitude_of = F::from(amplitude);
             for k in 1..points {

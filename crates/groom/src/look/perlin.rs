@@ -25,7 +25,9 @@ fn fade(t: f32) -> f32 {
 
 #[inline(always)]
 fn slope(key: u32, i: i32) -> f32 {
-    mix(key ^ (i as u32).wrapping_mul(0x9e37_79b9)) as i32 as f32 * (1.0 / 2_147_483_648.0)
+    let hash = mix(key ^ (i as u32).wrapping_mul(0x9e37_79b9));
+    // A number from 1 to 2 of which the hash gives the fraction.
+    f32::from_bits((hash >> 9) | 0x3f80_0000) * 2.0 - 3.0
 }
 
 /// Noise along a line, within -1 to 1; 0 at whole numbers.

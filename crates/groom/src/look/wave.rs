@@ -7,14 +7,13 @@
 //! `mean + deviation random(scale r)` with Perlin's noise for `random` (13 to 15), so random(0) = 0.
 
 use super::axes::{Beside, RootAxes};
-use super::lanes::{Block, F, LANES, gather, perlin1 as lanes_perlin1, sin_cos_turn};
+use super::lanes::{Block, F, LANES, U, gather, perlin1 as lanes_perlin1, sin_cos_turn};
 use super::perlin::{key, perlin1, perlin3};
 use super::vary::Drawn;
 use super::{CHUNK, Param, lanes, station_weights};
 use pelage_geom::TiledMap;
 use pelage_geom::rng::{channel, uniform};
 use rayon::prelude::*;
-use wide::u32x4;
 
 /// A value at four stations as a function of the root variable.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -191,7 +190,7 @@ impl OwnLanes {
         let turns = self.phase + sum(&self.frequency) * l;
         let wave = match shape {
             Shape::Sine => sin_cos_turn(turns).0,
-            Shape::Noise => lanes_perlin1(u32x4::splat(key ^ 0x5bd1_e995), turns),
+            Shape::Noise => lanes_perlin1(U::splat(key ^ 0x5bd1_e995), turns),
         };
         sum(&self.amplitude) * wave
     }
