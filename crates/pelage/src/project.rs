@@ -17,6 +17,9 @@ const FARTHEST: f64 = 1e18;
 /// a second of film more.
 const PREROLL: u32 = 12;
 
+/// Hairs a clump has at least in a draft: with fewer it does not look like one, with many more the draft is no faster.
+const HAIRS_A_CLUMP: f64 = 5.0;
+
 /// The one layer of hair from a curves file: what the file does not say.
 const CURVES_GROOM: &str = r#"
 [control]
@@ -113,6 +116,8 @@ pub struct Project {
     pub motion: Option<SkinMotion>,
     /// Files of particles, one entry an emitter.
     pub particles: Vec<Option<InputFile>>,
+    /// Share of each layer's hairs that this is of: 1 for the shot itself.
+    pub share: Vec<f64>,
     /// Every map, by the path written in the groom file: UDIM number (0 without tiles) and file.
     pub maps: BTreeMap<PathBuf, Vec<(u32, InputFile)>>,
 }
@@ -169,15 +174,20 @@ impl Project {
             }
         }
         hashes.save();
-        Ok(Project { shot, groom, rest, curves, bodies, drawn, frames, before, motion, particles, maps })
+        let share = vec![1.0; groom.value.layer.len()];
+        Ok(Project { shot, groom, share, rest, curves, bodies, drawn, frames, before, motion, particles, maps })
     }
 
-    /// The same shot with `percent` of its hairs, in (0, 100]: a smaller density keeps the first of the candidates, so each
+    /// The same shot with `percent` of its hairs, in (0, 100], or as many as its clumps need: a smaller density keeps the first of the candidates, so each
     /// of these hairs is one of the shot's, and as even over the skin. Hair from a curves file stays as it is.
     pub fn thinned(&self, percent: f64) -> Project {
         let mut out = self.clone();
-        for layer in &mut out.groom.value.layer {
-            layer.density.value *= percent / 100.0;
+        for (layer, share) in out.groom.value.layer.iter_mut().zip(&mut out.share) {
+            // Fewer hairs than that and clumps would be single hairs.
+            let clumps = layer.clump.iter().filter_map(|c| c.density.as_ref()).map(|d| d.at(0.0)).fold(0.0, f64::max);
+            let least = if layer.density.value > 0.0 { HAIRS_A_CLUMP * clumps / layer.density.value } else { 0.0 };
+            *share = (percent / 100.0).max(least).min(1.0);
+            layer.density.value *= *share;
         }
         out
     }

@@ -107,11 +107,11 @@ fn drawn(run: &mut Runner<'_>, percent: f64) -> Result<Drawn, Error> {
     for i in 0..count {
         hairs += export::look(run, i)?.offsets.len();
     }
-    let fewer = 100.0 / percent;
     // Curves are not thinned yet, grooms are.
-    let (least, wider) = if run.project.curves.is_some() { (fewer.round() as usize, 1.0) } else { (1, fewer as f32) };
+    let least = if run.project.curves.is_some() { (100.0 / percent).round() as usize } else { 1 };
     let every = hairs.div_ceil(DRAWN).max(least).max(1);
-    let layer = |i| Ok(thinned(export::look(run, i)?, every, wider));
+    let share = run.project.share.clone();
+    let layer = |i: usize| Ok(thinned(export::look(run, i)?, every, 1.0 / share[i] as f32));
     let layers = (0..count).map(layer).collect::<Result<_, Error>>()?;
     run.layers.clear();
     Ok(Drawn { layers, every })
