@@ -60,14 +60,14 @@ impl Pose {
         let tri = mesh.triangle[p.triangle as usize];
         let at = corners(&self.position, tri);
         let normals = tri.map(|v| to_f64(self.normal[v as usize]));
-        let face = (at[1] - at[0]).cross(&(at[2] - at[0]));
-        let n = [p.blend(normals), face].into_iter().find_map(|v| unit(v, 1.0)).unwrap_or(normals[0]);
+        let face = || (at[1] - at[0]).cross(&(at[2] - at[0]));
+        let n = unit(p.blend(normals), 1.0).or_else(|| unit(face(), 1.0)).unwrap_or(normals[0]);
 
         let tangents = topology.corner[p.triangle as usize].map(|c| to_f64(self.tangent[c as usize]));
-        let along_u = along_u(mesh, topology, p.triangle, at);
-        let du = [p.blend(tangents), along_u, tangents[0], tangents[1], tangents[2]]
-            .into_iter()
-            .find_map(|v| tangential(v, n))
+        // What comes second is rarely needed.
+        let du = tangential(p.blend(tangents), n)
+            .or_else(|| tangential(along_u(mesh, topology, p.triangle, at), n))
+            .or_else(|| tangents.into_iter().find_map(|v| tangential(v, n)))
             .unwrap_or_else(|| perpendicular(n));
         Frame { origin: p.blend(at), n, du, dv: n.cross(&du) }
     }

@@ -96,29 +96,29 @@ impl Beside {
         self.normal.clear();
         self.binormal.clear();
         self.arc.push(zero);
-        let mut before = V::gather(|l| root[l].tangent);
-        let (mut t0, mut x, mut arc) = (before, V::gather(|l| root[l].normal), zero);
-        let last = hairs.point.len() - 1;
-        for k in 0..=last {
-            let mut t = before;
-            if k < last {
-                let d = hairs.point[k + 1] - hairs.point[k];
-                let n = d.dot(d).sqrt();
-                arc += n;
-                self.arc.push(arc);
-                t = d.times(one / n).or(below(zero, n), before);
-            }
+        // Two loops: one of them waits for divisions, the other for the axis before.
+        let first = V::gather(|l| root[l].tangent);
+        let (mut before, mut arc) = (first, zero);
+        for (k, w) in hairs.point.windows(2).enumerate() {
+            let d = w[1] - w[0];
+            let n = d.dot(d).sqrt();
+            arc += n;
+            self.arc.push(arc);
+            let t = d.times(one / n).or(below(zero, n), before);
             // A point's tangent halves the angle between its segments.
             let sum = before + t;
             let n2 = sum.dot(sum);
-            let between = k > 0 && k < last;
-            let here = if between { sum.times(one / n2.sqrt()).or(below(F::splat(1e-8), n2), t) } else { t };
+            let middle = sum.times(one / n2.sqrt()).or(below(F::splat(1e-8), n2), t);
+            self.tangent.push(if k == 0 { t } else { middle });
             before = t;
-            x = turned_lanes(x, t0, here);
-            t0 = here;
-            self.tangent.push(here);
+        }
+        self.tangent.push(before);
+        let (mut t0, mut x) = (first, V::gather(|l| root[l].normal));
+        for &t in &self.tangent {
+            x = turned_lanes(x, t0, t);
+            t0 = t;
             self.normal.push(x);
-            self.binormal.push(here.cross(x));
+            self.binormal.push(t.cross(x));
         }
     }
 }

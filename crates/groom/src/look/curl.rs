@@ -58,17 +58,18 @@ impl Wave {
         m
     }
 
-    /// Wave at arc length `t`, its phase `phase` turns ahead, its frequency growing by `tighten` a pitch.
+    /// Turns at arc length `t` without the wave's own phase, the frequency growing by `tighten` a pitch.
     #[inline(always)]
-    fn at(&self, t: F, phase: F, tighten: F) -> F {
-        if *self == Wave::NONE {
-            return F::splat(0.0);
-        }
-        let of = F::splat;
-        let turns = (of(self.r) * t + of(self.p0) * (of(1.0) + tighten * t)) * t + of(self.phase) + phase;
+    fn turns(&self, t: F, tighten: F) -> F {
+        (F::splat(self.r) * t + F::splat(self.p0) * (F::splat(1.0) + tighten * t)) * t
+    }
+
+    /// Wave at arc length `t` where the sine and cosine of its turns are known.
+    #[inline(always)]
+    fn at(&self, t: F, (sin, cos): (F, F), (own_sin, own_cos): (f32, f32)) -> F {
         let only_a = self.b == 0.0 && self.c == 0.0 && self.d == 0.0;
-        let magnitude = if only_a { of(self.a) } else { F::from(t.to_array().map(|t| self.magnitude(t))) };
-        magnitude * sin_cos_turn(turns).0 + of(self.bias)
+        let magnitude = if only_a { F::splat(self.a) } else { F::from(t.to_array().map(|t| self.magnitude(t))) };
+        magnitude * (sin * F::splat(own_cos) + cos * F::splat(own_sin)) + F::splat(self.bias)
     }
 
     /// No offset.
@@ -167,6 +168,8 @@ struct Own<'a> {
     phase: F,
     tighten: F,
     plane: (F, F),
+    /// Sine and cosine of the waves' own phases.
+    own: [(f32, f32); 2],
 }
 
 impl<'a> Own<'a> {
@@ -181,6 +184,7 @@ impl<'a> Own<'a> {
             phase: of(&c.phase),
             tighten: of(&c.tighten),
             plane: sin_cos_turn(of(&c.angle)),
+            own: [0, 1].map(|a| libm::sincosf(std::f32::consts::TAU * c.wave[a].phase)),
         }
     }
 
@@ -198,8 +202,16 @@ impl<'a> Own<'a> {
         let c = self.curl;
         let f = if c.start > 0.0 { (t * F::splat(1.0 / c.start)).fast_min(one) } else { one };
         let size = self.radius * f * f * (F::splat(3.0) - f - f) * F::splat(*self.profile.get(k).unwrap_or(&1.0));
-        let x = size * c.wave[0].at(t, self.phase, tighten);
-        let y = size * c.wave[1].at(t, self.phase, tighten);
+        let [wx, wy] = &c.wave;
+        let turn = |w: &Wave| sin_cos_turn(w.turns(t, tighten) + self.phase);
+        let first = turn(wx);
+        let x = size * wx.at(t, first, self.own[0]);
+        let y = match () {
+            () if *wy == Wave::NONE => F::splat(0.0),
+            // One sine does for both.
+            () if wx.p0 == wy.p0 && wx.r == wy.r => size * wy.at(t, first, self.own[1]),
+            () => size * wy.at(t, turn(wy), self.own[1]),
+        };
         let (sin, cos) = self.plane;
         [x * cos - y * sin, x * sin + y * cos]
     }
