@@ -12,6 +12,7 @@
 //! **Inside** is decided along every segment, not at samples. Signed distance changes by at most the way gone, so nothing
 //! within d of a point at distance d is inside; where that says nothing, a ray does.
 
+use crate::push_up::{PushUp, drape};
 use pelage_geom::motion::RigidTransform;
 use pelage_geom::{Bvh, Offsets, Vec3};
 use rayon::prelude::*;
@@ -341,7 +342,10 @@ impl<'a> Job<'a> {
                 self.line.iter_mut().zip(&*self.stored).for_each(|(p, s)| *p = self.space.read(s));
             }
         }
-        let after = if clear && self.held == held { 0.0 } else { self.probe.depth(self.line, held, &mut other) };
+        let mut after = if clear && self.held == held { 0.0 } else { self.probe.depth(self.line, held, &mut other) };
+        if after > 0.0 && self.held == held && self.drape() {
+            after = self.probe.depth(self.line, held, &mut other);
+        }
         let far = self.line.iter().zip(&self.drawn.0).map(|(p, q)| (p - q).norm()).fold(0.0, f64::max);
         let longer = |(w, l): (&[Vec3], &f64)| if *l > 0.0 { ((w[1] - w[0]).norm() / l - 1.0).abs() } else { 0.0 };
         let stretched = self.line.windows(2).zip(&self.length).map(longer).fold(0.0, f64::max);
@@ -353,6 +357,20 @@ impl<'a> Job<'a> {
             moved: far,
             stretched: if after > 0.0 { 0.0 } else { stretched },
         }
+    }
+
+    /// The last resort for a hair that found no way: its segments are turned toward the normal one after another from the
+    /// root, as far as they must ([`drape`]). Ends up farther from where it was, but outside. False if that fails too.
+    fn drape(&mut self) -> bool {
+        let Depenetrate { step, clearance, .. } = *self.probe.settings;
+        let Some(root) = self.probe.bvh.closest(self.line[0], f64::INFINITY) else { return false };
+        let Some(line) = drape(self.probe.bvh, &PushUp { step, clearance }, root.normal, &self.drawn.0) else {
+            return false;
+        };
+        for (k, p) in line.into_iter().enumerate().skip(1) {
+            self.place(k, p);
+        }
+        true
     }
 
     /// Once along the hair: whether anything moved, and whether something inside could not be.

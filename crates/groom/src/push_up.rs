@@ -11,7 +11,7 @@
 
 use crate::comb::{rotate, slerp, world_points};
 use crate::control::{ControlHairs, Skin, to_local};
-use pelage_geom::{Bvh, Vec3};
+use pelage_geom::{Bvh, Closest, Vec3};
 use rayon::prelude::*;
 
 /// Length of the ramp at the root over which the clearance grows from 0, in clearances. At 3 hair lying flat would be
@@ -60,7 +60,7 @@ pub fn push_up(skin: &Skin, bvh: &Bvh, settings: &PushUp, hairs: &mut ControlHai
     let lift = |(h, local): (usize, &mut [[f32; 3]])| {
         let frame = skin.frame(&root[h]);
         let line = world_points(&frame, local);
-        let job = Job { skin, bvh, settings, normal: frame.n };
+        let job = Job { skin: Some(skin), bvh, settings, normal: frame.n };
         let (line, counts) = job.clear(line);
         if counts.pushed > 0 {
             for (out, p) in local.iter_mut().zip(&line) {
@@ -77,9 +77,17 @@ pub fn push_up(skin: &Skin, bvh: &Bvh, settings: &PushUp, hairs: &mut ControlHai
     })
 }
 
+/// A line from the skin turned out of it segment by segment, its lengths kept; `None` if there is no way out. `normal` is
+/// that of the skin at its root.
+pub(crate) fn drape(bvh: &Bvh, settings: &PushUp, normal: Vec3, line: &[Vec3]) -> Option<Vec<Vec3>> {
+    let (line, counts) = Job { skin: None, bvh, settings, normal }.clear(line.to_vec());
+    (counts.uncleared == 0).then_some(line)
+}
+
 /// One hair.
 struct Job<'a> {
-    skin: &'a Skin<'a>,
+    /// For smooth normals; without, those of triangles do.
+    skin: Option<&'a Skin<'a>>,
     bvh: &'a Bvh,
     settings: &'a PushUp,
     /// Normal at the root.
@@ -171,7 +179,8 @@ impl Job<'_> {
 
     /// Smooth normal of the skin nearest to a point.
     fn normal_near(&self, at: Vec3) -> Vec3 {
-        self.bvh.closest(at, f64::INFINITY).map_or(self.normal, |c| self.skin.frame(&c.point).n)
+        let smooth = |c: Closest| self.skin.map_or(c.normal, |s| s.frame(&c.point).n);
+        self.bvh.closest(at, f64::INFINITY).map_or(self.normal, smooth)
     }
 
     /// Walks along a segment that begins at arc length `before` of its hair (its first point was checked as the end of

@@ -397,6 +397,7 @@ impl<'a> Runner<'a> {
             let moment = match step.what {
                 What::Frame(_, f) => Some(f),
                 What::Simulate(_, k) => Some(k as i32),
+                What::Finished(_) => Some(i32::MIN),
                 _ => None,
             };
             let found = self.ran.get(&step.what).cloned().or_else(|| self.store.counts(&step.recipe.key()));
