@@ -262,7 +262,7 @@ pub const PARAMETERS: &[Shown] = &[
         "map = { map = \"maps/ramp.png\" }",
         "map = { map = \"maps/cells.png\" }",
     ]),
-    shown("wave.size", Curtain, "y = { amplitude = [0.1, 0.2, 0.2, 0.2], frequency = [3.0, 3.0, 3.0, 3.0], phase_deviation = 0.5, phase_scale = 3.0 }", ["size = 0.0", "size = 6.0", "size = 0.3"]),
+    shown("wave.size", Curtain, "y = { amplitude = [0.1, 0.2, 0.2, 0.2], frequency = [3.0, 3.0, 3.0, 3.0], phase_deviation = 0.4, phase_scale = 8.0 }", ["", "size = 4.0", "size = 0.3"]),
     shown("wave.stray", Curtain, "y = { amplitude_deviation = [0.3, 0.6, 0.8, 1.0], amplitude_scale = [9.0, 9.0, 9.0, 9.0], frequency = [1.0, 1.0, 1.0, 1.0] }", ["stray = 0.0", "stray = 0.1", "stray = 0.5"]),
     shown("wave.keep_length", Long, "y = { amplitude = [0.3, 0.3, 0.3, 0.3], frequency = [5.0, 5.0, 5.0, 5.0] }", ["keep_length = true", "", "keep_length = false"]),
     shown("axis.amplitude", Long, EVEN, [
