@@ -3,7 +3,9 @@
 //! by `cargo run --release -p pelage-tests --example parameter_pictures`.
 
 use pelage::config::{Document, GroomFile, ShotFile, schema};
-use pelage_tests::parameters::{PARAMETERS, Shown, WITHOUT};
+use pelage::format::mcap::read_hair_mcap;
+use pelage_tests::ShotFolder;
+use pelage_tests::parameters::{Shown, WITHOUT, parameters};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -69,7 +71,7 @@ fn pictured(shown: &Shown, key: &str, meaning: &str) -> String {
     )
 }
 
-fn parameters() -> String {
+fn pictures() -> String {
     let root = groom_schema();
     let mut out = format!(
         "{BEGINS}Low, usual, high, from left to right: fur of 1.7 cm on a patch of 4.4 by 3 cm, strands of 3.1 cm that hang \
@@ -81,7 +83,7 @@ fn parameters() -> String {
         let mut without = String::new();
         for (key, meaning) in keys(&root, table) {
             let full = format!("{name}.{key}");
-            if let Some(shown) = PARAMETERS.iter().find(|s| s.key == full) {
+            if let Some(shown) = parameters().find(|s| s.key == full) {
                 out += &pictured(shown, key, meaning);
             } else if let Some((_, why)) = WITHOUT.iter().find(|w| w.0 == full) {
                 let meaning = meaning.replace('\n', " ");
@@ -98,11 +100,11 @@ fn parameters() -> String {
 #[test]
 fn every_key_of_the_look_has_a_picture_or_a_reason() {
     let root = groom_schema();
-    let listed: Vec<&str> = PARAMETERS.iter().map(|s| s.key).chain(WITHOUT.iter().map(|w| w.0)).collect();
+    let listed: Vec<&str> = parameters().map(|s| s.key).chain(WITHOUT.iter().map(|w| w.0)).collect();
     let known: BTreeSet<String> =
         SECTIONS.iter().flat_map(|(_, name, t)| keys(&root, t).map(move |(key, _)| format!("{name}.{key}"))).collect();
     let absent: Vec<&String> = known.iter().filter(|k| !listed.contains(&k.as_str())).collect();
-    assert!(absent.is_empty(), "neither in PARAMETERS nor in WITHOUT: {absent:?}");
+    assert!(absent.is_empty(), "neither shown nor in WITHOUT: {absent:?}");
     for (i, key) in listed.iter().enumerate() {
         assert!(known.contains(*key), "{key} is not a key of the schema");
         assert!(!listed[..i].contains(key), "{key} is listed twice");
@@ -117,7 +119,7 @@ fn every_key_of_the_look_has_a_picture_or_a_reason() {
 
 #[test]
 fn every_setting_is_a_groom() {
-    for shown in PARAMETERS {
+    for shown in parameters() {
         for setting in shown.settings {
             let text = shown.groom(setting);
             let groom = Document::<GroomFile>::parse(Path::new(shown.key), text.clone())
@@ -135,7 +137,7 @@ fn the_page_shows_every_picture() {
     let path = docs().join("look.md");
     let found = std::fs::read_to_string(&path).expect("docs/look.md");
     let by_hand = found.split(BEGINS).next().expect("a beginning");
-    let text = format!("{by_hand}{}", parameters());
+    let text = format!("{by_hand}{}", pictures());
     if std::env::var_os("PELAGE_UPDATE_GOLDEN").is_some() {
         std::fs::write(&path, &text).expect("a file");
     } else {
@@ -144,7 +146,7 @@ fn the_page_shows_every_picture() {
     let folder = docs().join("pictures/look");
     let files = std::fs::read_dir(&folder).expect("pictures").map(|f| f.expect("a file").file_name());
     let files: BTreeSet<String> = files.map(|f| f.to_string_lossy().into_owned()).collect();
-    let wanted: BTreeSet<String> = PARAMETERS.iter().map(Shown::file).collect();
+    let wanted: BTreeSet<String> = parameters().map(Shown::file).collect();
     assert_eq!(files, wanted, "run the example parameter_pictures");
     for name in &wanted {
         assert!(text.contains(&format!("(pictures/look/{name})")), "docs/look.md does not show {name}");
@@ -171,4 +173,20 @@ fn examples_of_the_page_are_valid() {
     }
     let groom = Document::<GroomFile>::read(&docs().join("look-bust.toml")).and_then(|d| d.check());
     groom.unwrap_or_else(|e| panic!("{e}"));
+}
+
+#[test]
+fn hairs_come_to_a_line_drawn_by_hand() {
+    let shown = parameters().find(|s| s.key == "clump.curves").expect("a line drawn by hand");
+    let shot = ShotFolder::new(env!("CARGO_BIN_EXE_pelage-under-test"));
+    // All of the way, along a line that leaves the hair that carries it.
+    shown.files(shown.settings[1]).iter().for_each(|(name, bytes)| shot.write(name, bytes));
+    shot.edit("pipeline.toml", "formats = []", "formats = [\"mcap\"]");
+    shot.succeed(&["run", "--quiet"]);
+    let mut read = read_hair_mcap(&shot.path().join("out/shown/hair.mcap")).expect("an exported file");
+    let (layer, frame) = (read.layer(0).expect("a layer"), read.frame(0, 0).expect("a frame"));
+    let tips = (0..layer.id.len()).map(|h| frame.position[layer.offsets.range(h).end - 1]);
+    let there = |p: [f32; 3]| [1.2, 1.5, 0.5].iter().zip(p).all(|(a, b)| (a - b).abs() < 1e-4);
+    let found = tips.filter(|p| there(*p)).count();
+    assert!(found > 50, "{found} of {} hairs end where the line does", layer.id.len());
 }

@@ -67,7 +67,11 @@ impl Shown {
             own.sort_by_key(|text| text.contains("\n["));
         }
         let own = own.join("\n").trim().to_owned();
-        let given = |key: &str| own.lines().take_while(|l| !l.starts_with('[')).any(|l| l.split(['=', '.']).next().is_some_and(|k| k.trim() == key));
+        let given = |key: &str| {
+            own.lines()
+                .take_while(|l| !l.starts_with('['))
+                .any(|l| l.split(['=', '.']).next().is_some_and(|k| k.trim() == key))
+        };
         // What the table says besides, unless the parameter's own lines say it.
         let beside = |lines: &[&str]| -> String {
             let free = |l: &&&str| !given(l.split('=').next().expect("a key").trim());
@@ -95,11 +99,30 @@ impl Shown {
             out += RAIN;
         }
         let layer = match self.hair {
-            Hair::Long => ["density = { value = 6.5 }", "length = { value = 3.1 }", "width = { value = 620.0, tip = 0.5 }", "points = 121"],
-            Hair::Curtain => ["density = { value = 50.0 }", "length = { value = 3.1 }", "width = { value = 300.0 }", "points = 81"],
-            Hair::Ball => ["density = { value = 9.0 }", "length = { value = 1.3 }", "width = { value = 500.0 }", "points = 40"],
-            Hair::Rain => ["density = { value = 60.0 }", "length = { value = 1.0, noise = 0.12 }", "width = { value = 320.0 }", "points = 16"],
-            _ => ["density = { value = 45.0 }", "length = { value = 1.7, noise = 0.12 }", "width = { value = 320.0 }", "points = 28"],
+            Hair::Long => [
+                "density = { value = 6.5 }",
+                "length = { value = 3.1 }",
+                "width = { value = 620.0, tip = 0.5 }",
+                "points = 121",
+            ],
+            Hair::Curtain => {
+                ["density = { value = 50.0 }", "length = { value = 3.1 }", "width = { value = 300.0 }", "points = 81"]
+            }
+            Hair::Ball => {
+                ["density = { value = 9.0 }", "length = { value = 1.3 }", "width = { value = 500.0 }", "points = 40"]
+            }
+            Hair::Rain => [
+                "density = { value = 60.0 }",
+                "length = { value = 1.0, noise = 0.12 }",
+                "width = { value = 320.0 }",
+                "points = 16",
+            ],
+            _ => [
+                "density = { value = 45.0 }",
+                "length = { value = 1.7, noise = 0.12 }",
+                "width = { value = 320.0 }",
+                "points = 28",
+            ],
         };
         let color = if points == 8 { LIGHT } else { COLOR };
         let all = [layer[0], layer[1], layer[2], layer[3], color];
@@ -151,7 +174,9 @@ impl Shown {
     /// The skin, and four triangles too small to be seen, outside the picture, that hold the camera where it is.
     fn skin(&self) -> Mesh {
         let mut mesh = match self.hair {
-            Hair::Fur | Hair::Field | Hair::Rain => bent(16, |x, z| Vec3::new(4.4 * x, -0.5 * x * x - 0.4 * z * z, 3.0 * z)),
+            Hair::Fur | Hair::Field | Hair::Rain => {
+                bent(16, |x, z| Vec3::new(4.4 * x, -0.5 * x * x - 0.4 * z * z, 3.0 * z))
+            }
             // Upside down: a strip of a tube, turned to the camera, whose hair hangs.
             Hair::Long | Hair::Curtain => bent(16, |x, z| {
                 let (sin, cos) = (0.8 - 1.2 * z).sin_cos();

@@ -7,7 +7,7 @@ use image::{ExtendedColorType, ImageEncoder, RgbImage};
 use pelage::progress::Progress;
 use pelage::project::Project;
 use pelage::stage::{Options, Runner, Stage};
-use pelage_tests::parameters::{PARAMETERS, Shown};
+use pelage_tests::parameters::{Shown, parameters};
 use pelage_tests::{ShotFolder, indexed_png};
 use std::path::Path;
 
@@ -22,7 +22,7 @@ fn main() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/pictures/look");
     std::fs::create_dir_all(&folder).expect("a folder");
     let mut bytes = 0;
-    for shown in PARAMETERS.iter().filter(|s| wanted.is_empty() || wanted.iter().any(|w| s.key.starts_with(w))) {
+    for shown in parameters().filter(|s| wanted.is_empty() || wanted.iter().any(|w| s.key.starts_with(w))) {
         let pictures = shown.settings.map(|setting| drawn(shown, setting));
         let png = quantised(&row(&pictures));
         bytes += png.len();

@@ -131,8 +131,7 @@ fn collide(
     };
     let c = run.project.groom.value.layer[i].collision;
     let millimetre = 1e-3 / run.project.shot.value.shot.meters_per_unit;
-    let settings =
-        Depenetrate { step: millimetre, clearance: c.clearance * millimetre, held: c.held * millimetre };
+    let settings = Depenetrate { step: millimetre, clearance: c.clearance * millimetre, held: c.held * millimetre };
     let points = run.project.points(i);
     let offsets = Offsets::uniform(position.len() / points, points);
     let found = depenetrate(bvh, &settings, motion, &offsets, skin.origin(), position);
