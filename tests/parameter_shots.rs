@@ -137,7 +137,10 @@ impl Shown {
             "wave" | "noise" => format!("\n[[layer.{first}]]\n{own}\n"),
             "curl" | "wind" | "collision" | "width" | "color" | "guard" => format!("\n[layer.{first}]\n{own}\n"),
             "dilation" | "wet" => {
-                format!("\n[[layer.clump]]\ndensity = 1.0\npercent = 0.95\n\n[layer.clump.{first}]\n{own}\n")
+                // A scale needs regions to differ over.
+                let regions = "regions = { map = \"maps/cells.png\" }";
+                let made = if self.key == "dilation.scale" { regions } else { "density = 1.0" };
+                format!("\n[[layer.clump]]\n{made}\npercent = 0.95\n\n[layer.clump.{first}]\n{own}\n")
             }
             "custom" => format!("\n[layer.curl]\n{CUSTOM}\n\n[layer.curl.x]\n{own}\n"),
             "axis" => format!("\n[[layer.wave]]\n{own}\n"),

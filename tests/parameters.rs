@@ -75,9 +75,9 @@ const OPERATORS: &[Shown] = &[
         Field,
         DENSE,
         [
-            "percent = { value = 0.7 }",
-            "percent = { value = 0.7, noise = 0.4 }",
-            "percent = { value = 0.7, noise = 1.0 }",
+            "percent = { value = 1.0 }",
+            "percent = { value = 1.0, noise = 0.4 }",
+            "percent = { value = 1.0, noise = 1.0 }",
         ],
     ),
     shown(
