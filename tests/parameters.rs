@@ -459,7 +459,7 @@ const OPERATORS: &[Shown] = &[
     shown(
         "wind.size",
         Field,
-        "amplitude = 0.8\ndirection = [1.0, 0.0, 0.0]\ngust = 1.0",
+        "amplitude = 0.8\ndirection = [1.0, 0.0, 0.0]\ngust = 0.6",
         ["size = 0.3", "size = 2.0", "size = 20.0"],
     ),
     shown(
