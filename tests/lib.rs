@@ -1,5 +1,8 @@
 //! Small shots made in a temporary folder, and the command to run over them.
 
+pub mod parameter_shots;
+pub mod parameters;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -227,6 +230,27 @@ pub fn grey_png(width: u32, height: u32, value: impl Fn(u32, u32) -> u8) -> Vec<
     chunk(&mut out, b"IHDR", &header);
     chunk(&mut out, b"IDAT", &stored_zlib(&raw));
     chunk(&mut out, b"IEND", &[]);
+    out
+}
+
+/// The PNG whose pixels are those of an 8-bit greyscale PNG looked up in a palette.
+pub fn indexed_png(grey: &[u8], palette: &[[u8; 3]]) -> Vec<u8> {
+    let (signature, mut rest) = grey.split_at(8);
+    let mut out = signature.to_vec();
+    while let Some((head, tail)) = rest.split_first_chunk::<8>() {
+        let length = u32::from_be_bytes([head[0], head[1], head[2], head[3]]) as usize;
+        let name = [head[4], head[5], head[6], head[7]];
+        let mut data = tail[..length].to_vec();
+        if &name == b"IHDR" {
+            // Colour type: 0 is grey, 3 is an index.
+            data[9] = 3;
+        }
+        chunk(&mut out, &name, &data);
+        if &name == b"IHDR" {
+            chunk(&mut out, b"PLTE", palette.as_flattened());
+        }
+        rest = &tail[length + 4..];
+    }
     out
 }
 

@@ -84,7 +84,7 @@ fn section(root: &Value, v: &Value, name: &str, out: &mut String) {
 fn reference() -> String {
     let mut out = String::from(
         "# Reference\nEvery key of the two files that a person writes. Unknown keys are refused. Paths are relative to the \
-         file that\nnames them. `[]` marks lists of tables, written `[[layer]]`. What the values do: `docs/stages.md`.\n",
+         file that\nnames them. `[]` marks lists of tables, written `[[layer]]`. What the values do: `docs/stages.md`;\nthe look in pictures: `docs/look.md`.\n",
     );
     for (title, text) in
         [("`pipeline.toml`: a shot", schema::<ShotFile>()), ("`grooms/*.toml`: a groom", schema::<GroomFile>())]

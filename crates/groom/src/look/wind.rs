@@ -63,7 +63,9 @@ pub fn wind(points: usize, w: &Wind, position: &mut [[f32; 3]]) {
                 let l = F::splat(k as f32 / (points - 1) as f32);
                 let [a, b] = perlin3(noise, here - down.times(l * F::splat(LAG)));
                 let size = F::from(amplitude) * l * l;
-                let push = down.times(size * (F::splat(1.0) + a * F::splat(w.gust)));
+                // Wind does not turn back between gusts.
+                let force = (F::splat(1.0) + a * F::splat(w.gust)).fast_max(F::splat(0.0));
+                let push = down.times(size * force);
                 block.point[k] = block.point[k] + push + side.times(size * b * F::splat(0.5 * w.gust));
             }
             block.relay(&arc.arc);

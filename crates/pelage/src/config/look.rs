@@ -477,7 +477,8 @@ pub struct WindLook {
 pub struct Collision {
     /// Do it. Default: true.
     pub enabled: bool,
-    /// Distance from the skin at which pushed hairs end, millimetres. Default: 0.05.
+    /// Distance from the skin at which pushed hairs end, millimetres; it grows from 0 at the root over a hundred times this.
+    /// Default: 0.05.
     pub clearance: f64,
     /// Length at the root that may be inside, millimetres. Default: 1.
     pub held: f64,

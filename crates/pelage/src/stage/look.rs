@@ -4,7 +4,7 @@ use super::clumps::{self, RestSites};
 use super::plan_look::{Effect, collides, effects, overridden};
 use super::run::{Counts, Runner};
 use super::skin::Texel;
-use super::{Skin, SkinPose, What, groom, instance, interpolate, layer_seed};
+use super::{SkinPose, What, groom, instance, interpolate, layer_seed};
 use crate::Error;
 use crate::config::{self, CurlKind, LookValue, WaveShape};
 use crate::format::HairLayer;
@@ -131,8 +131,7 @@ fn collide(
     };
     let c = run.project.groom.value.layer[i].collision;
     let millimetre = 1e-3 / run.project.shot.value.shot.meters_per_unit;
-    let settings =
-        Depenetrate { step: millimetre, clearance: c.clearance * millimetre, held: c.held * millimetre };
+    let settings = Depenetrate { step: millimetre, clearance: c.clearance * millimetre, held: c.held * millimetre };
     let points = run.project.points(i);
     let offsets = Offsets::uniform(position.len() / points, points);
     let found = depenetrate(bvh, &settings, motion, &offsets, skin.origin(), position);
@@ -168,9 +167,13 @@ fn prepared(
     }
     for effect in acting {
         columns(run, i, *effect, &roots, &sites, &mut look)?;
-        if let Effect::Clump(k) = effect {
+        if let Effect::Clump(k) = effect
+            && let Some(lines) = &run.project.groom.value.layer[i].clump[*k].curves
+        {
             let members = clumps::clumps(run, i, *k)?;
-            bind(run, i, *k, &skin, &members, points, &rest, &mut look);
+            let axes = carried(&skin.mesh, &skin.topology, &skin.rest, &roots.root, &look.axes);
+            let line = sampled(lines, Vec3::from(skin.origin()), points);
+            look.drawn.insert(*k, bind_lines(points, &rest, &members.centre, &axes, &line));
         }
     }
     note_coarse_curls(run, i, acting, points)?;
@@ -183,26 +186,13 @@ fn refined(position: Vec<[f32; 3]>, from: usize, to: usize) -> Vec<[f32; 3]> {
     if from == to { position } else { refine(from, to, &position) }
 }
 
-/// Lines drawn by hand for a level, said in the axes of the hairs that carry them.
-fn bind(
-    run: &Runner<'_>,
-    i: usize,
-    k: usize,
-    skin: &Skin,
-    members: &Members,
-    points: usize,
-    rest: &[[f32; 3]],
-    look: &mut LayerLook,
-) {
-    let Some(lines) = &run.project.groom.value.layer[i].clump[k].curves else { return };
-    let origin = Vec3::from(skin.origin());
+/// C lines drawn by hand, scene units, as C times P points relative to an origin.
+fn sampled(lines: &[Vec<[f64; 3]>], origin: Vec3, points: usize) -> Vec<[f32; 3]> {
     let sampled = |line: &Vec<[f64; 3]>| {
         let line: Vec<Vec3> = line.iter().map(|p| Vec3::from(*p) - origin).collect();
         pelage_geom::curve::resample(&line, points)
     };
-    let flat: Vec<[f32; 3]> =
-        lines.iter().flat_map(sampled).map(|p| [p.x as f32, p.y as f32, p.z as f32]).collect();
-    look.drawn.insert(k, bind_lines(points, rest, &members.centre, &look.axes, &flat));
+    lines.iter().flat_map(sampled).map(|p| [p.x as f32, p.y as f32, p.z as f32]).collect()
 }
 
 /// Columns of a part's parameters.
