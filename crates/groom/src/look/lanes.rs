@@ -155,7 +155,7 @@ pub(crate) fn perlin3(key: u32, p: V) -> [F; 2] {
         let weight = side[0][x] * side[1][y] * side[2][z];
         let slope = |bits: U| {
             let unit: F = bytemuck::cast((bits & U::splat(31 << 18)) | U::splat(0x3f80_0000));
-            (unit - F::splat(1.484_375)) * F::splat(2.064_516_1)
+            (unit - F::splat(1.484_375)) * F::splat(64.0 / 31.0)
         };
         let (dx, dy, dz) = (from[0][x], from[1][y], from[2][z]);
         sum[0] += weight * (slope(hash << 18) * dx + slope(hash << 13) * dy + slope(hash << 8) * dz);

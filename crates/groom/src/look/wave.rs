@@ -128,10 +128,10 @@ pub fn wave(points: usize, w: &Waves, position: &mut [[f32; 3]]) {
             block.load(points, hairs);
             along.set(&block, lane.map(|h| &w.axes[h]));
             let total = along.arc[points - 1].fast_max(F::splat(f32::MIN_POSITIVE));
-            for k in 1..points {
+            for (k, stations) in stations.iter().enumerate().skip(1) {
                 let l = along.arc[k] / total;
-                let x = own[0].at(w.shape, names[0][2], &stations[k], l);
-                let y = own[1].at(w.shape, names[1][2], &stations[k], l);
+                let x = own[0].at(w.shape, names[0][2], stations, l);
+                let y = own[1].at(w.shape, names[1][2], stations, l);
                 block.point[k] = block.point[k] + along.normal[k].times(x) + along.binormal[k].times(y);
             }
             if w.keep_length {

@@ -121,7 +121,7 @@ pub struct Clump {
     /// Clumps placed by hand: lines at the rest pose, root first, which are centres; they move with the hairs nearest to
     /// their roots.
     #[serde(default, deserialize_with = "some_lines")]
-    pub curves: Option<Vec<Vec<[f64; 3]>>>,
+    pub curves: Option<Lines>,
     /// Radius of a clump, scene units (for regions: the longest step between hairs of one region). Default: so large that
     /// every hair is in a clump.
     pub size: Option<LookValue>,
@@ -170,7 +170,10 @@ fn some_points<'de, D: Deserializer<'de>>(d: D) -> Result<Option<Vec<[f64; 3]>>,
     Ok(Some(Vec::<Fixed<f64, 3>>::deserialize(d)?.into_iter().map(|p| p.0).collect()))
 }
 
-fn some_lines<'de, D: Deserializer<'de>>(d: D) -> Result<Option<Vec<Vec<[f64; 3]>>>, D::Error> {
+/// Lines of points.
+type Lines = Vec<Vec<[f64; 3]>>;
+
+fn some_lines<'de, D: Deserializer<'de>>(d: D) -> Result<Option<Lines>, D::Error> {
     let lines = Vec::<Vec<Fixed<f64, 3>>>::deserialize(d)?;
     Ok(Some(lines.into_iter().map(|l| l.into_iter().map(|p| p.0).collect()).collect()))
 }
