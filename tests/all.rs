@@ -6,6 +6,7 @@ mod depenetrate;
 mod determinism;
 mod foreign;
 mod golden;
+mod look;
 mod reference;
 mod rows;
 mod samples;

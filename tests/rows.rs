@@ -4,6 +4,8 @@
 use pelage_tests::{ExportedHair, ShotFolder, ascii_ply, deformed, exported_hairs, grey_png, small_shot};
 use std::collections::{BTreeMap, BTreeSet};
 
+mod look;
+
 const COMMAND: &str = env!("CARGO_BIN_EXE_pelage-under-test");
 const GROOM: &str = "grooms/ball.toml";
 const SHOT: &str = "pipeline.toml";

@@ -259,8 +259,14 @@ impl Project {
 
     /// True if hair is clumped where particles hit the skin.
     pub fn has_areas(&self) -> bool {
-        let clumps = self.groom.value.layer.iter().flat_map(|l| &l.clump);
-        self.shot.value.look.clump && clumps.into_iter().any(|c| !c.areas.is_empty())
+        (0..self.groom.value.emitter.len()).any(|k| self.opens_areas(k))
+    }
+
+    /// True if clumps act where the particles of an emitter hit the skin.
+    pub fn opens_areas(&self, emitter: usize) -> bool {
+        let name = &self.groom.value.emitter[emitter].name;
+        let mut clumps = self.groom.value.layer.iter().flat_map(|l| &l.clump);
+        self.shot.value.look.clump && clumps.any(|c| c.areas.contains(name))
     }
 
     /// Number of the frame whose keys hold: at rest, the shot's first.

@@ -426,6 +426,17 @@ impl WaveAxis {
         ];
         stations.into_iter().flat_map(|(key, v)| v.map(|x| (key, x))).chain(phase).collect()
     }
+
+    /// Values by key as text, those of stations together.
+    pub fn settings(&self) -> Vec<(&'static str, String)> {
+        let values = self.values();
+        let same = values.chunk_by(|a, b| a.0 == b.0);
+        same.map(|s| match s {
+            [(key, x)] => (*key, x.to_string()),
+            _ => (s[0].0, format!("{:?}", s.iter().map(|v| v.1).collect::<Vec<_>>())),
+        })
+        .collect()
+    }
 }
 
 /// Random offsets across the hair, smooth along it.

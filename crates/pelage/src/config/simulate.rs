@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::de::{DeserializeOwned, Deserializer, Error as _};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
+use std::fmt;
 
 /// Segments of a simulated hair of a groom: twice the 12 points that long control hair is combed with. Half as many bend
 /// in visible corners, twice as many cost twice the time.
@@ -253,6 +254,13 @@ impl BodyKind {
 #[serde(transparent)]
 pub struct Vector(#[serde(deserialize_with = "exactly")] pub [f64; 3]);
 
+impl fmt::Display for Vector {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [x, y, z] = self.0;
+        write!(f, "[{x}, {y}, {z}]")
+    }
+}
+
 /// A number, or three.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "expected a number, three numbers, or a list of { frame, value }")]
@@ -286,6 +294,17 @@ impl<T> Keyed<T> {
     /// True if there are keys, each after the one before.
     pub fn in_order(&self) -> bool {
         !self.0.is_empty() && self.0.windows(2).all(|k| k[0].frame < k[1].frame)
+    }
+}
+
+/// The value, or `[frame: value, ...]`.
+impl<T: fmt::Display> fmt::Display for Keyed<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let [k] = &self.0[..] {
+            return k.value.fmt(f);
+        }
+        let keys: Vec<String> = self.0.iter().map(|k| format!("{}: {}", k.frame, k.value)).collect();
+        write!(f, "[{}]", keys.join(", "))
     }
 }
 

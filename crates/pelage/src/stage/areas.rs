@@ -66,6 +66,9 @@ fn find(run: &mut Runner<'_>, frame: i32) -> Result<Hits, Error> {
 fn particles(run: &Runner<'_>, k: usize, frame: i32) -> Result<Vec<Particle>, Error> {
     let shot = &run.project.shot.value.shot;
     let e = &run.project.groom.value.emitter[k];
+    if !run.project.opens_areas(k) {
+        return Ok(Vec::new());
+    }
     if let Some(file) = &run.project.particles[k] {
         let all = csv::read_particles(&file.path, shot.fps)?;
         let leaves = |p: &Particle| (f64::from(frame)..f64::from(frame) + 1.0).contains(&p.time);

@@ -1,7 +1,7 @@
 //! The look: what displaces a layer's hairs at rest or at a frame, part after part.
 
 use super::clumps::{self, RestSites};
-use super::plan_look::{Effect, collides, effects, overridden};
+use super::plan_look::{Effect, by_clump, collides, overridden};
 use super::run::{Counts, Runner};
 use super::skin::Texel;
 use super::{Skin, SkinPose, What, groom, instance, interpolate, layer_seed};
@@ -255,10 +255,7 @@ fn columns(
 
 /// For each hair the centre of its clump in the last level, or itself.
 fn representatives(run: &mut Runner<'_>, i: usize) -> Result<Vec<u32>, Error> {
-    let levels = run.project.groom.value.layer[i].clump.len();
-    let [simulated, after] = effects(run.project, i);
-    let acts = |k: &usize| simulated.iter().chain(&after).any(|e| *e == Effect::Clump(*k));
-    let Some(last) = (0..levels).rev().find(acts) else {
+    let Some(last) = by_clump(run.project, i) else {
         return Ok((0..instance::roots(run, i)?.id.len() as u32).collect());
     };
     let m = clumps::clumps(run, i, last)?;
