@@ -243,9 +243,12 @@ fn edits_of_maps_of_the_look_touch_only_hairs_under_them() {
 fn wet_hair_is_wider_where_particles_have_hit() {
     let shot = look_shot(COMMAND, 4);
     let report = shot.report(&["--to", "export"]);
-    let hits = &report["stages"].as_array().expect("stages")[3]["counts"]["particles on the skin"];
+    let counts = |report: &serde_json::Value| {
+        let counts = &report["stages"].as_array().expect("stages")[3]["counts"];
+        ["on", "past"].map(|n| counts[&format!("particles {n} the skin")].as_u64().expect("a count"))
+    };
     // Two a frame, all of which hit the ball: counted once, not once a frame.
-    assert_eq!(hits, 8, "{report}");
+    assert_eq!(counts(&report), [8, 0], "{report}");
     let under = |frame: i32| layers(&shot, frame).into_iter().find(|l| l.name == "under").expect("the layer");
     let mut seen = 0;
     for frame in 1..=4 {
@@ -256,4 +259,9 @@ fn wet_hair_is_wider_where_particles_have_hit() {
         seen = wet;
     }
     assert!(seen > 5, "{seen} wet hairs");
+    shot.edit(GROOM, "spread = 10", "spread = 180\nframes = [-3, 2]");
+    let report = shot.report(&["--to", "export"]);
+    let [on, past] = counts(&report);
+    assert!(on + past == 4 && past > 0, "{on} and {past} particles");
+    assert!(report.to_string().contains("emitter hose: particles that leave before frame 1 open no areas"), "{report}");
 }

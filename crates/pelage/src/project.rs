@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::cache::FileHashes;
-use crate::config::{BodyKind, BodyMesh, Document, Emitter, Feature, GroomFile, Keyed, Material, SEGMENTS, ShotFile, Target};
+use crate::config::{BodyKind, BodyMesh, Document, Emitter, Feature, GroomFile, Key, Keyed, Material, SEGMENTS, ShotFile, Target};
 use crate::format::csv;
 use pelage_geom::RigidMotion;
 use pelage_geom::motion::RigidTransform;
@@ -115,6 +115,8 @@ pub struct Project {
     pub particles: Vec<Option<InputFile>>,
     /// Every map, by the path written in the groom file: UDIM number (0 without tiles) and file.
     pub maps: BTreeMap<PathBuf, Vec<(u32, InputFile)>>,
+    /// True for a part of the shot's hairs ([`Project::thinned`]).
+    pub draft: bool,
 }
 
 impl Project {
@@ -169,13 +171,13 @@ impl Project {
             }
         }
         hashes.save();
-        Ok(Project { shot, groom, rest, curves, bodies, drawn, frames, before, motion, particles, maps })
+        Ok(Project { shot, groom, rest, curves, bodies, drawn, frames, before, motion, particles, maps, draft: false })
     }
 
     /// The same shot with `percent` of its hairs, in (0, 100]: a smaller density keeps the first of the candidates, so each
     /// of these hairs is one of the shot's, and as even over the skin. Hair from a curves file stays as it is.
     pub fn thinned(&self, percent: f64) -> Project {
-        let mut out = self.clone();
+        let mut out = Project { draft: true, ..self.clone() };
         for layer in &mut out.groom.value.layer {
             layer.density.value *= percent / 100.0;
         }
@@ -325,11 +327,15 @@ fn check_overrides(shot: &Document<ShotFile>, groom: &Document<GroomFile>) -> Re
             return Err(shot.error(&format!("{at}.layer"), what, "name a [[layer]] of the groom file").into());
         };
         if o.clump >= layer.clump.len() {
-            let what = format!("layer {} has {} levels of clumps", o.layer, layer.clump.len());
-            return Err(shot.error(&format!("{at}.clump"), what, "they are numbered from 0").into());
+            let what = format!("layer {} has no level {} of clumps", o.layer, o.clump);
+            return Err(shot.error(&format!("{at}.clump"), what, "levels are numbered from 0").into());
+        }
+        if o.percent.is_none() && o.rate.is_none() {
+            return Err(shot.error(&at, "changes nothing", "give percent or rate, or take it out").into());
         }
         for (key, keyed) in [("percent", &o.percent), ("rate", &o.rate)] {
-            let fine = |k: &Keyed<f64>| k.in_order() && k.0.iter().all(|k| (0.0..=1.0).contains(&k.value));
+            let within = |k: &Key<f64>| (0.0..=1.0).contains(&k.value) && k.frame.is_finite();
+            let fine = |k: &Keyed<f64>| k.in_order() && k.0.iter().all(within);
             if !keyed.iter().all(fine) {
                 let help = "a number, or key frames in order";
                 return Err(shot.error(&format!("{at}.{key}"), "must be between 0 and 1", help).into());

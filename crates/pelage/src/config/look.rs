@@ -5,9 +5,11 @@ use super::document::{ConfigError, Document, Fixed, exactly};
 use super::simulate::{Keyed, Vector};
 use super::{Channel, GroomFile, Layer, MapRef, WrapMode};
 use schemars::JsonSchema;
-use serde::de::{Deserializer, Error as _};
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
+use std::fmt;
 use std::path::PathBuf;
 
 /// A number, key frames, or a table with a map and variation: `0.7`, `[{ frame = 1001, value = 0 }, ...]`,
@@ -72,14 +74,35 @@ impl LookValue {
 
 impl<'de> Deserialize<'de> for LookValue {
     fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
-        let failed = |e: toml::de::Error| D::Error::custom(e.message());
-        match toml::Value::deserialize(d)? {
-            toml::Value::Table(t) => VariedValue::deserialize(t).map(LookValue).map_err(failed),
-            value => {
-                let value = Keyed::deserialize(value).map_err(failed)?;
-                Ok(LookValue(VariedValue { value, ..LookValue::constant(0.0).0 }))
-            }
-        }
+        d.deserialize_any(AnyOf)
+    }
+}
+
+/// Reads what is there without going through a tree of values, so that errors point into it.
+struct AnyOf;
+
+impl<'de> Visitor<'de> for AnyOf {
+    type Value = LookValue;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a number, key frames [{ frame, value }], or a table with a value")
+    }
+
+    fn visit_f64<E: serde::de::Error>(self, x: f64) -> Result<LookValue, E> {
+        Ok(LookValue::constant(x))
+    }
+
+    fn visit_i64<E: serde::de::Error>(self, x: i64) -> Result<LookValue, E> {
+        Ok(LookValue::constant(x as f64))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<LookValue, A::Error> {
+        let value = Keyed::deserialize(SeqAccessDeserializer::new(list))?;
+        Ok(LookValue(VariedValue { value, ..LookValue::constant(0.0).0 }))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, table: A) -> Result<LookValue, A::Error> {
+        VariedValue::deserialize(MapAccessDeserializer::new(table)).map(LookValue)
     }
 }
 
@@ -796,8 +819,9 @@ impl Document<GroomFile> {
                 return Err(self.error(&format!("{at}.{}", v.name), "can't have key frames", help));
             }
         }
+        let none = c.roots.as_ref().is_some_and(Vec::is_empty) || c.curves.as_ref().is_some_and(Vec::is_empty);
         let lines = c.curves.iter().flatten().map(|l| (l.as_slice(), 2)).chain(c.roots.iter().map(|r| (r.as_slice(), 1)));
-        for (line, least) in lines {
+        for (line, least) in lines.chain(none.then_some((&[][..], 1))) {
             if line.len() < least || !line.iter().flatten().all(|x| x.is_finite()) {
                 let what = "clumps placed by hand need finite points, a curve two or more";
                 return Err(self.error(at, what, "root first, at the rest pose, in scene units"));
@@ -902,24 +926,29 @@ impl Document<GroomFile> {
             }
             let finite = |v: &Vector| v.0.iter().all(|x| x.is_finite());
             if !e.position.iter().flat_map(|p| &p.0).all(|k| finite(&k.value)) {
-                return Err(self.error(&format!("{at}.position"), "must be three finite numbers", ""));
+                return Err(self.error(&format!("{at}.position"), "must be three finite numbers", "in scene units"));
             }
             if !e.direction.iter().all(|d| finite(d) && d.0 != [0.0; 3]) {
                 return Err(self.error(&format!("{at}.direction"), "must be a direction", "for example [0, -1, 0]"));
             }
+            let position = e.position.iter().flat_map(|p| &p.0);
+            position.map(|k| k.frame).try_for_each(|f| self.within(&format!("{at}.position"), f, -1e9, 1e9))?;
             if !e.position.iter().all(Keyed::in_order) {
                 let help = "each comes after the one before";
                 return Err(self.error(&format!("{at}.position"), "key frames are not in order", help));
             }
             if e.frames.is_some_and(|f| f[0] > f[1]) {
-                return Err(self.error(&format!("{at}.frames"), "the last frame comes before the first", ""));
+                return Err(self.error(&format!("{at}.frames"), "the last frame comes before the first", "first, last"));
             }
             self.within(&format!("{at}.spread"), e.spread, 0.0, 180.0)?;
             self.within(&format!("{at}.rate"), e.rate, 0.0, 1e5)?;
             for (key, v, most) in
                 [("radius", &e.radius, 1e6), ("percent", &e.percent, 1.0), ("clump_rate", &e.clump_rate, 1.0)]
             {
-                v.0.iter().try_for_each(|k| self.within(&format!("{at}.{key}"), k.value, 0.0, most))?;
+                for k in &v.0 {
+                    self.within(&format!("{at}.{key}"), k.value, 0.0, most)?;
+                    self.within(&format!("{at}.{key}"), k.frame, -1e9, 1e9)?;
+                }
                 if !v.in_order() {
                     let help = "each comes after the one before";
                     return Err(self.error(&format!("{at}.{key}"), "key frames are not in order", help));

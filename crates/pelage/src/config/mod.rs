@@ -8,7 +8,8 @@ mod simulate;
 
 pub use document::{ConfigError, Document};
 pub use groom::{
-    Channel, ColorFeature, Comb, CombKind, Control, Feature, GroomFile, Guard, Layer, MapRef, Parting, Placement,
+    Channel, ColorFeature, Comb, CombKind, Control, Feature, GroomFile, Guard, Layer, MOST_POINTS, MapRef, Parting,
+    Placement,
 };
 pub use groom::{Side, Space, WidthFeature, WrapMode};
 pub use look::{

@@ -145,7 +145,9 @@ fn centre_hairs(
             return Ok(Vec::new());
         }
         let found = nearest_hairs(hairs.position, &by_hand);
-        if let Some(k) = (1..found.len()).find(|k| found[..*k].contains(&found[*k])) {
+        // In a draft two share what hair there is: the others of a clump follow the first.
+        let same = (1..found.len()).find(|k| found[..*k].contains(&found[*k]));
+        if let Some(k) = same.filter(|_| !run.project.draft) {
             let what = format!("number {k} of a clump placed by hand has the same nearest hair as one before it");
             return Err(run.project.groom.error(at, what, "place them farther apart, or grow more hair there").into());
         }

@@ -276,9 +276,12 @@ fn note_coarse_curls(run: &mut Runner<'_>, i: usize, acting: &[Effect], points: 
     let found = (points - 1) as f64 / turns;
     if turns > 0.0 && found < SMOOTH {
         let enough = (turns * 2.0 * SMOOTH).ceil() as usize + 1;
+        let help = match enough {
+            0..=config::MOST_POINTS => format!("layer.points = {enough} draws them round"),
+            _ => format!("{} points draw no turn as short as {pitch}", config::MOST_POINTS),
+        };
         run.warnings.push(format!(
-            "layer {}: a turn of its curls has {found:.1} segments on the longest hair: layer.points = {enough} draws \
-             them round",
+            "layer {}: a turn of its curls has {found:.1} segments on the longest hair: {help}",
             layer.name
         ));
     }

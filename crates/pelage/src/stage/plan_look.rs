@@ -265,7 +265,7 @@ impl Reader<'_> {
         let mut r = Recipe::new("", 0).param(&format!("{key}.seed"), seed, self.in_groom(&format!("layer[{i}].name")));
         let moment = self.project.moment(frame);
         let areas = matches!(effect, Effect::Clump(k) if self.in_areas(i, k));
-        if areas && frame.is_none() {
+        if frame.is_none() && (areas || effect == Effect::Wind) {
             return Vec::new();
         }
         for (_, v) in layer.varied().into_iter().filter(|(k, _)| *k == key) {
