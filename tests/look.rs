@@ -119,8 +119,7 @@ fn at_full_percent_and_no_rate_tips_meet_at_their_centres() {
     let clumped = |density: &str| {
         let look = format!("[[layer.clump]]\ndensity = {density}\npercent = 1\nrate = 0\n");
         let shot = open(with_look(2, &look));
-        let report: serde_json::Value =
-            serde_json::from_slice(&shot.read("out/ball/report.json")).expect("a report");
+        let report: serde_json::Value = serde_json::from_slice(&shot.read("out/ball/report.json")).expect("a report");
         let counts = &report["stages"].as_array().expect("stages").iter().find(|s| s["name"] == "instance");
         let n = counts.expect("the stage")["counts"]["clumps in level 0 of layer over"].as_u64().expect("a count");
         (shot, n as usize)
@@ -207,7 +206,10 @@ fn on_a_deforming_skin_offsets_turn_with_the_hair() {
         before = Some(now);
     }
     assert!(most > 0.01, "nothing turned");
-    assert!(most < 0.2 && worst < 0.05, "offsets turn by {most} rad in a frame, {worst} more than twice the hair's turn");
+    assert!(
+        most < 0.2 && worst < 0.05,
+        "offsets turn by {most} rad in a frame, {worst} more than twice the hair's turn"
+    );
 }
 
 #[test]

@@ -43,14 +43,21 @@ fn what_clumps_are() {
                 "density = 0.5\n",
                 "density = 0.5\narea = { map = \"../maps/area.png\" }\n",
                 &both,
-                &["file maps/area.png added", "layer[1].clump[0].area.channel added", "layer[1].clump[0].area.wrap added"],
+                &[
+                    "file maps/area.png added",
+                    "layer[1].clump[0].area.channel added",
+                    "layer[1].clump[0].area.wrap added",
+                ],
             ),
         ],
     );
     shot.write("maps/area.png", grey_png(32, 32, |x, _| if x < 16 { 255 } else { 0 }));
     expect(&shot, &with_files(&both), &["maps/area.png changed"]);
     let after = hairs(&shot);
-    assert!(before.iter().filter(|(k, _)| k.0 == "under").all(|(k, h)| after[k] == *h), "another layer's hairs changed");
+    assert!(
+        before.iter().filter(|(k, _)| k.0 == "under").all(|(k, h)| after[k] == *h),
+        "another layer's hairs changed"
+    );
     assert!(before.iter().any(|(k, h)| after[k] != *h));
 }
 
@@ -65,7 +72,12 @@ fn how_clumps_draw() {
             ("rate = 0.25", "rate = 0.5", &[OVER], &["layer[1].clump[0].rate 0.25 -> 0.5"]),
             ("splay = 0.125", "splay = 0.25", &[OVER], &["layer[1].clump[0].splay 0.125 -> 0.25"]),
             ("splay = 0.25", "splay = 0.25\ntaper = 0.5", &[OVER], &["layer[1].clump[0].taper 0 -> 0.5"]),
-            ("taper = 0.5", "taper = 0.5\nkeep_length = true", &[OVER], &["layer[1].clump[0].keep_length false -> true"]),
+            (
+                "taper = 0.5",
+                "taper = 0.5\nkeep_length = true",
+                &[OVER],
+                &["layer[1].clump[0].keep_length false -> true"],
+            ),
         ],
     );
     // The map of the percent is the other layer's density too; the first layer does not wait for the second.
@@ -120,7 +132,12 @@ fn emitters_and_their_areas() {
         &[
             ("spread = 10", "spread = 12", &both, &["emitter[0].spread 10 -> 12"]),
             ("rate = 48", "rate = 72", &both, &["emitter[0].rate 48 -> 72"]),
-            ("position = [0, 20, 0]", "position = [1, 20, 0]", &both, &["emitter[0].position [0, 20, 0] -> [1, 20, 0]"]),
+            (
+                "position = [0, 20, 0]",
+                "position = [1, 20, 0]",
+                &both,
+                &["emitter[0].position [0, 20, 0] -> [1, 20, 0]"],
+            ),
             ("rate = 72", "rate = 72\nseed = 3", &both, &["emitter[0].seed 0 -> 3"]),
             ("percent = 0.875", "percent = 0.5", &frames, &["emitter[0].percent 0.875 -> 0.5"]),
             (
@@ -129,12 +146,7 @@ fn emitters_and_their_areas() {
                 &frames,
                 &["emitter[0].radius [0: 0, 4: 2] -> [0: 0, 4: 3]"],
             ),
-            (
-                "wet = { width = 1.5,",
-                "wet = { width = 1.25,",
-                &frames,
-                &["layer[0].clump[0].wet.width 1.5 -> 1.25"],
-            ),
+            ("wet = { width = 1.5,", "wet = { width = 1.25,", &frames, &["layer[0].clump[0].wet.width 1.5 -> 1.25"]),
         ],
     );
     // What nothing names opens no areas, so it costs nothing.
@@ -148,16 +160,13 @@ fn emitters_and_their_areas() {
 fn what_a_shot_changes_of_the_look() {
     let shot = looked();
     // From the groom's value on the first frame on: the rest pose and that frame stay.
-    let keys = "\n[[look.override]]\nlayer = \"over\"\npercent = [{ frame = 1, value = 0.75 }, { frame = 3, value = 0.25 }]\n";
+    let keys =
+        "\n[[look.override]]\nlayer = \"over\"\npercent = [{ frame = 1, value = 0.75 }, { frame = 3, value = 0.25 }]\n";
     let text = String::from_utf8(shot.read(SHOT)).expect("text");
     shot.write(SHOT, text + keys);
     let late = ["interpolate/over/2", "interpolate/over/3"];
     let percent = "pipeline.toml: look.override[0].percent";
-    expect(
-        &shot,
-        &with_files(&late),
-        &[&format!("{percent} 0.75 -> 0.5"), &format!("{percent} 0.75 -> 0.25")],
-    );
+    expect(&shot, &with_files(&late), &[&format!("{percent} 0.75 -> 0.5"), &format!("{percent} 0.75 -> 0.25")]);
     // A key at the end changes the frames on its way.
     shot.edit(SHOT, "frame = 3, value = 0.25 }", "frame = 2, value = 0.5 }");
     let files = ["interpolate/over/3", "export/usd", "export/mcap"];
@@ -249,7 +258,12 @@ fn no_tweak_of_the_look_simulates() {
             ("size = 2", "size = 2\npercent = 0.8", &LATER, &["layer[1].clump[0].percent 0.7 -> 0.8"]),
             ("size = 2", "size = 2\nrate = 0.5", &LATER, &["layer[1].clump[0].rate 0 -> 0.5"]),
             ("radius = 0.05", "radius = 0.1", &LATER, &["layer[1].curl.radius 0.05 -> 0.1"]),
-            ("width = { value = 40.0", "width = { value = 55.0", &["instance/width/under"], &["layer[0].width.value 40 -> 55"]),
+            (
+                "width = { value = 40.0",
+                "width = { value = 55.0",
+                &["instance/width/under"],
+                &["layer[0].width.value 40 -> 55"],
+            ),
             (
                 "[0.4, 0.2, 0.1]",
                 "[0.4, 0.3, 0.1]",
@@ -289,10 +303,15 @@ fn what_is_simulated_of_the_look_simulates() {
 fn curls_by_clump_follow_the_clumps_wherever_they_act() {
     // The curls are simulated, the clumps come later; still hairs of a clump curl alike.
     let shot = simulated();
-    shot.edit(GROOM, "name = \"over\"", "name = \"over\"\norder = [\"curl\", \"clump\", \"wave\", \"noise\", \"wind\"]");
+    shot.edit(
+        GROOM,
+        "name = \"over\"",
+        "name = \"over\"\norder = [\"curl\", \"clump\", \"wave\", \"noise\", \"wind\"]",
+    );
     shot.edit(GROOM, "pitch = 1.5", "pitch = 1.5\nper_clump = true\nsimulate = true");
     shot.report(&[]);
     shot.edit(GROOM, "density = 0.25", "density = 0.125");
-    let again = [&LATER[..], &["interpolate/over/rest", "simulate/over/1", "simulate/over/3", "instance/clump[0]/over"]];
+    let again =
+        [&LATER[..], &["interpolate/over/rest", "simulate/over/1", "simulate/over/3", "instance/clump[0]/over"]];
     expect(&shot, &with_files(&again.concat()), &["grooms/ball.toml: layer[1].clump[0].density 0.25 -> 0.125"]);
 }

@@ -335,6 +335,11 @@ impl<'a> Job<'a, '_> {
                     axes: self.axes,
                 };
                 curl(points, &settings, &mut self.out.position);
+                if !self.out.position.iter().flatten().all(|x| x.is_finite()) {
+                    let what = "the offset grows beyond all numbers on a hair as long as those of this layer";
+                    let help = "lower gamma, or move t0 to the tip";
+                    return Err(project.groom.error(&format!("layer[{}].curl", self.i), what, help).into());
+                }
             }
             Effect::Wave(k) => {
                 let w = &layer.wave[k];

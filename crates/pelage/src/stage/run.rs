@@ -397,6 +397,8 @@ impl<'a> Runner<'a> {
             let moment = match step.what {
                 What::Frame(_, f) | What::Hits(f) => Some(f),
                 What::Simulate(_, k) => Some(k as i32),
+                // Hairs of the rest pose a second time.
+                What::Finished(_) => Some(i32::MIN),
                 _ => None,
             };
             let found = self.ran.get(&step.what).cloned().or_else(|| self.store.counts(&step.recipe.key()));
