@@ -7,6 +7,7 @@ mod determinism;
 mod foreign;
 mod golden;
 mod look;
+mod look_page;
 mod reference;
 mod rows;
 mod samples;

@@ -2,7 +2,7 @@
 //! kills and beside other runs.
 
 use pelage_geom::rng;
-use pelage_tests::{ShotFolder, simulated_shot, small_shot};
+use pelage_tests::{ShotFolder, look_shot, simulated_shot, small_shot};
 use std::collections::BTreeMap;
 use std::process::{Child, Stdio};
 use std::time::Duration;
@@ -72,9 +72,16 @@ fn simulated() -> ShotFolder {
     shot
 }
 
+/// Six frames with every part of the look.
+fn looked() -> ShotFolder {
+    let shot = look_shot(COMMAND, 6);
+    shot.edit("pipeline.toml", "[\"usd\", \"mcap\"]", "[\"mcap\"]");
+    shot
+}
+
 #[test]
 fn threads_do_not_show() {
-    for shot in [every_format(), simulated()] {
+    for shot in [every_format(), simulated(), looked()] {
         let expected = reference(&shot);
         for jobs in ["2", "5"] {
             let other = shot.fresh();
@@ -90,8 +97,9 @@ fn splits_do_not_show() {
     let expected = reference(&shot);
     assert_eq!(expected.0.len(), 9, "two whole-shot files, six frames and a picture");
     split(&shot, &expected);
-    let shot = simulated();
-    split(&shot, &reference(&shot));
+    for shot in [simulated(), looked()] {
+        split(&shot, &reference(&shot));
+    }
 }
 
 fn split(shot: &ShotFolder, expected: &(Files, Files)) {
@@ -139,6 +147,33 @@ fn a_warm_cache_does_not_show() {
     assert_finished(&shot, &expected, "pruned");
 }
 
+#[test]
+fn a_warm_cache_does_not_show_in_the_look() {
+    let shot = looked();
+    let expected = reference(&shot);
+    shot.report(&[]);
+    let edits = [
+        ("density = 0.25", "density = 0.5"),
+        ("rate = 0.25", "rate = 0.5"),
+        ("pitch = 0.8", "pitch = 0.6"),
+        ("spread = 10", "spread = 20"),
+    ];
+    for (from, to) in edits {
+        shot.edit(GROOM, from, to);
+        shot.report(&[]);
+        assert!(shot.outputs() != expected.0);
+        assert_same(&shot.outputs(), &reference(&shot).0, to);
+    }
+    for (from, to) in edits {
+        shot.edit(GROOM, to, from);
+    }
+    assert!(shot.plan(&["--to", "interpolate"]).0.is_empty());
+    shot.report(&[]);
+    assert_same(&shot.outputs(), &expected.0, "edits taken back");
+    shot.succeed(&["cache", "prune"]);
+    assert_finished(&shot, &expected, "pruned");
+}
+
 fn start(shot: &ShotFolder, arguments: &[&str]) -> Child {
     let mut command = shot.command(&[&["run", "--quiet"], arguments].concat());
     command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("the command starts")
@@ -160,6 +195,13 @@ fn kills_do_not_show_in_simulated_hair() {
     shot.edit("pipeline.toml", "[\"usd\", \"mcap\"]", "[\"mcap\"]");
     shot.edit(GROOM, "value = 0.6", "value = 6.0");
     kill_often(&shot, 30, 160);
+}
+
+#[test]
+fn kills_do_not_show_in_the_look() {
+    let shot = looked();
+    shot.edit(GROOM, "value = 4.0", "value = 16.0");
+    kill_often(&shot, 20, 160);
 }
 
 /// Kills runs of a shot at random moments, up to so many milliseconds after their start; what they leave and what comes

@@ -3,7 +3,7 @@
 use pelage::curves::{self, CurveSet};
 use pelage::format::image::{Channel, read_map};
 use pelage_geom::{Mesh, Topology, shapes};
-use pelage_tests::{ShotFolder, ascii_ply, grey_png, small_shot};
+use pelage_tests::{ShotFolder, ascii_ply, grey_png, look_shot, small_shot};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -232,6 +232,16 @@ fn a_deforming_skin_on_two_tiles() {
     shot.edit("pipeline.toml", "name = \"ball\"", "name = \"tiled\"");
     shot.edit("pipeline.toml", "motion = \"grooms/ball.csv\"", "frames = \"anim/ball.####.ply\"");
     check("tiled", &shot);
+}
+
+#[test]
+fn every_part_of_the_look() {
+    let shot = look_shot(COMMAND, 3);
+    shot.edit("pipeline.toml", "name = \"ball\"", "name = \"look\"");
+    let color = "color = { value = [0.4, 0.2, 0.1]";
+    let guard = "guard = { percent = 0.1, length = 1.25 }";
+    shot.edit("grooms/ball.toml", color, &format!("{guard}\n{color}, noise = 0.25, ramp = [[1, 1, 1], [2, 2, 3]]"));
+    check("look", &shot);
 }
 
 #[test]

@@ -298,6 +298,66 @@ pub fn simulated_shot(command: &str, frames: u32) -> ShotFolder {
     shot
 }
 
+/// The small shot with every part of the look: in one layer clumps of clumps, curls by clump and frizz, in the other wet
+/// clumps where an emitter's particles hit, waves and wind.
+pub fn look_shot(command: &str, frames: u32) -> ShotFolder {
+    let shot = small_shot(command, frames);
+    shot.edit(
+        "grooms/ball.toml",
+        "width = { value = 40.0, tip = 0.5 }\n",
+        r#"width = { value = 40.0, tip = 0.5 }
+
+[[layer.clump]]
+density = 0.8
+areas = ["hose"]
+wet = { width = 1.5, opacity = 0.75 }
+
+[[layer.wave]]
+x = { amplitude = [0.02, 0.04, 0.04, 0.02], frequency = [1, 2, 2, 1] }
+size = 1.0
+
+[layer.wind]
+amplitude = 0.1
+direction = [1, 0, 0]
+size = 3.0
+"#,
+    );
+    let groom = String::from_utf8(shot.read("grooms/ball.toml")).expect("text");
+    let more = r#"points = 25
+
+[[layer.clump]]
+density = 0.25
+percent = { value = 0.75, map = "../maps/half.png", noise = 0.1 }
+rate = 0.25
+splay = 0.125
+
+[[layer.clump]]
+density = 0.0625
+percent = [{ frame = 1, value = 0.25 }, { frame = 5, value = 0.75 }]
+
+[layer.curl]
+kind = "helix"
+radius = 0.08
+pitch = 0.8
+per_clump = true
+
+[[layer.noise]]
+amplitude = 0.03
+size = 0.5
+
+[[emitter]]
+name = "hose"
+position = [0, 20, 0]
+direction = [0, -1, 0]
+spread = 10
+rate = 48
+radius = [{ frame = 0, value = 0 }, { frame = 4, value = 2 }]
+percent = 0.875
+"#;
+    shot.write("grooms/ball.toml", groom + more);
+    shot
+}
+
 /// A small two-layer shot on a ball of radius 5 cm with six charts, moved rigidly over `frames` frames.
 pub fn small_shot(command: &str, frames: u32) -> ShotFolder {
     let shot = ShotFolder::new(command);

@@ -1,192 +1,269 @@
-//! `docs/look.md` shows every parameter of the look: the text of its second half is made from the configuration structs
-//! and the list of pictures. `PELAGE_UPDATE_GOLDEN=1 cargo test -p pelage-tests look::` rewrites it; the pictures are made
-//! by `cargo run --release -p pelage-tests --example parameter_pictures`.
+//! Laws of the look on exported hair.
 
-use pelage::config::{Document, GroomFile, ShotFile, schema};
-use pelage::format::mcap::read_hair_mcap;
-use pelage_tests::ShotFolder;
-use pelage_tests::parameters::{Shown, WITHOUT, parameters};
-use serde_json::Value;
-use std::collections::BTreeSet;
-use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use pelage::curves::{self, CurveSet};
+use pelage_tests::{ShotFolder, deformed, grey_png, look_shot, small_shot};
+use std::collections::{BTreeMap, BTreeSet};
 
-/// Tables of the page: title, name in the list of pictures, name in the schema.
-const SECTIONS: [(&str, &str, &str); 19] = [
-    ("`[[layer.clump]]`", "clump", "Clump"),
-    ("`layer.clump.dilation`", "dilation", "Dilation"),
-    ("`layer.clump.wet`", "wet", "Wet"),
-    ("`[layer.curl]`", "curl", "Curl"),
-    ("`layer.curl.x`, `layer.curl.y`", "custom", "CurlWave"),
-    ("`[[layer.wave]]`", "wave", "Wave"),
-    ("`layer.wave.x`, `layer.wave.y`", "axis", "WaveAxis"),
-    ("`[[layer.noise]]`", "noise", "Noise"),
-    ("`[layer.wind]`", "wind", "WindLook"),
-    ("`[layer.collision]`", "collision", "Collision"),
-    ("`[[emitter]]`", "emitter", "Emitter"),
-    ("A value of the look", "value", "VariedValue"),
-    ("`vary` of a value", "vary", "VaryScale"),
-    ("`[[layer]]`", "layer", "Layer"),
-    ("`density`, `length`, `opacity` of a layer", "feature", "Feature"),
-    ("`layer.width`", "width", "WidthFeature"),
-    ("`layer.color`", "color", "ColorFeature"),
-    ("`layer.guard`", "guard", "Guard"),
-    ("`[[comb]]`", "comb", "Comb"),
-];
+const COMMAND: &str = env!("CARGO_BIN_EXE_pelage-under-test");
+const GROOM: &str = "grooms/ball.toml";
+const SHOT: &str = "pipeline.toml";
 
-/// Tables of a groom file that are not shown: where hair stands, what it is made of, where a map is.
-const ELSEWHERE: [&str; 6] = ["Control", "Placement", "Parting", "Material", "MapRef", "Key"];
+type V3 = [f64; 3];
 
-/// Where the part of the page begins that is made here.
-const BEGINS: &str = "## Every parameter\n";
-
-fn docs() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs")
+/// The shot without collision, hair as its formulas leave it; only the frames are made and written.
+fn open(shot: ShotFolder) -> ShotFolder {
+    let text = String::from_utf8(shot.read(SHOT)).expect("text");
+    shot.write(SHOT, format!("{text}\n[look]\ncollision = false\n").replace("\"usd\", ", ""));
+    shot.report(&["--to", "export"]);
+    shot
 }
 
-fn groom_schema() -> Value {
-    serde_json::from_str(&schema::<GroomFile>()).expect("a schema is JSON")
+/// One layer with a look of its own on 0.5 hairs per square centimetre, nothing in the other.
+fn with_look(frames: u32, look: &str) -> ShotFolder {
+    let shot = small_shot(COMMAND, frames);
+    shot.edit(GROOM, "value = 4.0", "value = 0.1");
+    let groom = String::from_utf8(shot.read(GROOM)).expect("text");
+    shot.write(GROOM, groom + "points = 13\n" + look);
+    shot
 }
 
-fn keys<'a>(root: &'a Value, table: &str) -> impl Iterator<Item = (&'a String, &'a str)> {
-    let properties = root["$defs"][table]["properties"].as_object().unwrap_or_else(|| panic!("no table {table}"));
-    properties.iter().map(|(key, p)| (key, p["description"].as_str().unwrap_or("")))
+fn layers(shot: &ShotFolder, frame: i32) -> Vec<CurveSet> {
+    let file = shot.path().join("out/ball/hair.mcap");
+    curves::read(&file, Some(f64::from(frame))).unwrap_or_else(|e| panic!("{e}")).layers
 }
 
-/// Settings as they stand in a file, on one line.
-fn code(text: &str) -> String {
-    let lines = text.lines().filter(|l| !l.is_empty()).map(|l| format!("`{l}`"));
-    let all = lines.collect::<Vec<_>>().join(" ");
-    if all.is_empty() { "not given".to_owned() } else { all }
+/// Hairs of the layer "over" at a frame by id, bit by bit.
+fn over(shot: &ShotFolder, frame: i32) -> BTreeMap<u64, Vec<[f32; 3]>> {
+    let layer = layers(shot, frame).into_iter().find(|l| l.name == "over").expect("the layer");
+    let s = &layer.strands;
+    (0..s.len()).map(|i| (s.id[i], s.points(i).to_vec())).collect()
 }
 
-fn pictured(shown: &Shown, key: &str, meaning: &str) -> String {
-    let captions = shown.settings.map(code).join(" · ");
-    let beside = if shown.with.is_empty() { String::new() } else { format!("<br>beside {}", code(shown.with)) };
-    format!(
-        "\n**`{key}`**: {}\n\n![{}](pictures/look/{})<br>{captions}{beside}\n",
-        meaning.replace('\n', " "),
-        shown.key,
-        shown.file()
-    )
+fn minus(a: &[f32; 3], b: &[f32; 3]) -> V3 {
+    std::array::from_fn(|x| f64::from(a[x]) - f64::from(b[x]))
 }
 
-fn pictures() -> String {
-    let root = groom_schema();
-    let mut out = format!(
-        "{BEGINS}Low, usual, high, from left to right: fur of 1.7 cm on a patch of 4.4 by 3 cm, strands of 3.1 cm that hang \
-         from a bar.\nThe settings stand below the pictures, and what else the table says (what acts always has a value).\n"
-    );
-    for (title, name, table) in SECTIONS {
-        let about = root["$defs"][table]["description"].as_str().unwrap_or("").replace('\n', " ");
-        writeln!(out, "\n### {title}\n{about}").expect("text");
-        let mut without = String::new();
-        for (key, meaning) in keys(&root, table) {
-            let full = format!("{name}.{key}");
-            if let Some(shown) = parameters().find(|s| s.key == full) {
-                out += &pictured(shown, key, meaning);
-            } else if let Some((_, why)) = WITHOUT.iter().find(|w| w.0 == full) {
-                let meaning = meaning.replace('\n', " ");
-                writeln!(without, "- **`{key}`**: {meaning} ({why})").expect("text");
+fn dot(a: &V3, b: &V3) -> f64 {
+    (0..3).map(|x| a[x] * b[x]).sum()
+}
+
+fn norm(a: &V3) -> f64 {
+    dot(a, a).sqrt()
+}
+
+fn length(hair: &[[f32; 3]]) -> f64 {
+    hair.windows(2).map(|w| norm(&minus(&w[1], &w[0]))).sum()
+}
+
+/// Angle between two vectors.
+fn angle(a: &V3, b: &V3) -> f64 {
+    let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    norm(&cross).atan2(dot(a, b))
+}
+
+#[test]
+fn every_effect_leaves_roots_names_and_counts() {
+    let looked = open(look_shot(COMMAND, 4));
+    let plain = small_shot(COMMAND, 4);
+    plain.edit(GROOM, "color =", "points = 25\ncolor =");
+    let plain = open(plain);
+    let mut bent = 0;
+    for frame in 1..=4 {
+        for (a, b) in layers(&looked, frame).iter().zip(&layers(&plain, frame)) {
+            let (s, t) = (&a.strands, &b.strands);
+            assert_eq!((&s.id, &s.offsets, s.origin), (&t.id, &t.offsets, t.origin));
+            assert!(s.len() > 300 && s.position.iter().flatten().all(|x| x.is_finite()));
+            for i in 0..s.len() {
+                assert_eq!(s.points(i)[0], t.points(i)[0], "the root of hair {} of {} moved", s.id[i], a.name);
+                bent += usize::from(s.points(i) != t.points(i));
             }
         }
-        if !without.is_empty() {
-            write!(out, "\nWithout a picture:\n\n{without}").expect("text");
+    }
+    // Wind, waves and frizz spare no hair.
+    assert_eq!(bent, 4 * layers(&plain, 1).iter().map(|l| l.strands.len()).sum::<usize>());
+}
+
+#[test]
+fn lengths_are_those_of_the_mode() {
+    let plain = over(&open(with_look(1, "")), 1);
+    let clump = "[[layer.clump]]\ndensity = 0.25\npercent = 0.9\nrate = 0.5\nkeep_length = ";
+    let curl = "[layer.curl]\nkind = \"helix\"\nradius = 0.1\npitch = 1.2\nkeep_length = ";
+    let noise = "[[layer.noise]]\namplitude = 0.05\nsize = 0.5\nkeep_length = ";
+    let wave = "[[layer.wave]]\nx = { amplitude = [0.1, 0.1, 0.1, 0.1], frequency = [2, 2, 2, 2] }\nkeep_length = ";
+    let wind = "[layer.wind]\namplitude = 0.5\ndirection = [1, 0, 0]\nsize = 3\n# ";
+    for (name, look) in [("clump", clump), ("curl", curl), ("noise", noise), ("wave", wave), ("wind", wind)] {
+        let kept = over(&open(with_look(1, &format!("{look}true\n"))), 1);
+        let worst = plain.iter().map(|(id, h)| (length(&kept[id]) / length(h) - 1.0).abs()).fold(0.0, f64::max);
+        assert!(worst < 1e-5, "{name} changes a length by {worst}");
+        assert!(kept != plain);
+        if name == "wind" {
+            continue;
+        }
+        let free = over(&open(with_look(1, &format!("{look}false\n"))), 1);
+        let changes: Vec<f64> = plain.iter().map(|(id, h)| length(&free[id]) / length(h) - 1.0).collect();
+        let mean = changes.iter().sum::<f64>() / changes.len() as f64;
+        match name {
+            // A hair drawn to a neighbour may become shorter or longer.
+            "clump" => assert!(changes.iter().any(|c| c.abs() > 1e-3)),
+            // A helix of radius r and pitch p is sqrt(1 + (2 pi r / p)^2) as long: 1.129, less where it begins at the
+            // root, and drawn with corners.
+            "curl" => assert!((0.06..0.13).contains(&mean), "curls make hair longer by {mean}"),
+            _ => assert!(mean > 0.01, "{name} makes hair longer by {mean}"),
         }
     }
-    out
 }
 
 #[test]
-fn every_key_of_the_look_has_a_picture_or_a_reason() {
-    let root = groom_schema();
-    let listed: Vec<&str> = parameters().map(|s| s.key).chain(WITHOUT.iter().map(|w| w.0)).collect();
-    let known: BTreeSet<String> =
-        SECTIONS.iter().flat_map(|(_, name, t)| keys(&root, t).map(move |(key, _)| format!("{name}.{key}"))).collect();
-    let absent: Vec<&String> = known.iter().filter(|k| !listed.contains(&k.as_str())).collect();
-    assert!(absent.is_empty(), "neither shown nor in WITHOUT: {absent:?}");
-    for (i, key) in listed.iter().enumerate() {
-        assert!(known.contains(*key), "{key} is not a key of the schema");
-        assert!(!listed[..i].contains(key), "{key} is listed twice");
-    }
-    assert!(WITHOUT.iter().all(|w| !w.1.is_empty()), "a reason is given");
-    let tables = root["$defs"].as_object().expect("tables").iter().filter(|(_, d)| d["properties"].is_object());
-    for (name, _) in tables {
-        let shown = SECTIONS.iter().any(|s| s.2 == name) || ELSEWHERE.iter().any(|e| name.starts_with(e));
-        assert!(shown, "the page has no section for the table {name}");
-    }
-}
-
-#[test]
-fn every_setting_is_a_groom() {
-    for shown in parameters() {
-        for setting in shown.settings {
-            let text = shown.groom(setting);
-            let groom = Document::<GroomFile>::parse(Path::new(shown.key), text.clone())
-                .and_then(|g| g.check().map(|()| g))
-                .unwrap_or_else(|e| panic!("{} with `{setting}`: {e}\n{text}", shown.key));
-            assert_eq!(groom.value.layer.len(), 1);
+fn at_full_percent_and_no_rate_tips_meet_at_their_centres() {
+    let plain = open(with_look(2, ""));
+    let clumped = |density: &str| {
+        let look = format!("[[layer.clump]]\ndensity = {density}\npercent = 1\nrate = 0\n");
+        let shot = open(with_look(2, &look));
+        let report: serde_json::Value = serde_json::from_slice(&shot.read("out/ball/report.json")).expect("a report");
+        let counts = &report["stages"].as_array().expect("stages").iter().find(|s| s["name"] == "instance");
+        let n = counts.expect("the stage")["counts"]["clumps in level 0 of layer over"].as_u64().expect("a count");
+        (shot, n as usize)
+    };
+    let (few, n) = clumped("0.125");
+    let (more, m) = clumped("0.25");
+    assert!(n > 20 && m > n, "{n} and {m} clumps");
+    let mut centres = [BTreeSet::new(), BTreeSet::new()];
+    for frame in [1, 2] {
+        let straight = over(&plain, frame);
+        for ((shot, n), centres) in [(&few, n), (&more, m)].into_iter().zip(&mut centres) {
+            let hairs = over(shot, frame);
+            let own: BTreeMap<u64, [u32; 3]> = hairs
+                .iter()
+                .filter(|(id, h)| straight[*id] == **h)
+                .map(|(id, h)| (*id, h[12].map(f32::to_bits)))
+                .collect();
+            // Only centres stay, and every tip is one of theirs, bit for bit.
+            assert_eq!(own.len(), n);
+            let tips: BTreeSet<[u32; 3]> = own.values().copied().collect();
+            assert!(hairs.values().all(|h| tips.contains(&h[12].map(f32::to_bits))));
+            let ids: BTreeSet<u64> = own.into_keys().collect();
+            assert!(centres.is_empty() || *centres == ids, "other centres at another frame");
+            *centres = ids;
         }
-        let [low, usual, high] = shown.settings;
-        assert!(low != high && !(low == usual && usual == high), "{}: three settings that show nothing", shown.key);
+    }
+    assert!(centres[0].is_subset(&centres[1]), "a higher clump density takes centres away");
+}
+
+#[test]
+fn under_a_rigid_motion_curls_move_rigidly() {
+    let look = "[[layer.clump]]\ndensity = 0.25\n[layer.curl]\nkind = \"dished\"\nradius = 0.1\npitch = 0.8\n\
+                [[layer.wave]]\nx = { amplitude = [0.1, 0.1, 0.1, 0.1], frequency = [2, 2, 2, 2] }\nsize = 1\n\
+                [[layer.noise]]\namplitude = 0.05\nsize = 0.5\n";
+    let shot = open(with_look(4, look));
+    let first = over(&shot, 1);
+    for frame in 2..=4 {
+        // The motion's table: 0.05 rad about y and 0.1 cm along x a frame.
+        let k = f64::from(frame - 1);
+        let (sin, cos) = (0.05 * k).sin_cos();
+        let mut worst = 0.0f64;
+        for (id, hair) in over(&shot, frame) {
+            for (p, q) in first[&id].iter().zip(&hair) {
+                let [x, y, z] = p.map(f64::from);
+                let there = [cos * x + sin * z + 0.1 * k, y, cos * z - sin * x];
+                worst = (0..3).map(|x| (there[x] - f64::from(q[x])).abs()).fold(worst, f64::max);
+            }
+        }
+        assert!(worst < 1e-5 * 2.5, "frame {frame}: {worst} cm off");
     }
 }
 
 #[test]
-fn the_page_shows_every_picture() {
-    let path = docs().join("look.md");
-    let found = std::fs::read_to_string(&path).expect("docs/look.md");
-    let by_hand = found.split(BEGINS).next().expect("a beginning");
-    let text = format!("{by_hand}{}", pictures());
-    if std::env::var_os("PELAGE_UPDATE_GOLDEN").is_some() {
-        std::fs::write(&path, &text).expect("a file");
-    } else {
-        assert!(found == text, "docs/look.md is out of date: PELAGE_UPDATE_GOLDEN=1 cargo test -p pelage-tests look::");
+fn on_a_deforming_skin_offsets_turn_with_the_hair() {
+    let curl = "[layer.curl]\nkind = \"helix\"\nradius = 0.1\npitch = 0.8\nkeep_length = false\n";
+    let [plain, curled] = ["", curl].map(|look| {
+        let shot = with_look(6, look);
+        for frame in 1..=6 {
+            shot.write(&format!("anim/ball.{frame:04}.ply"), deformed(2.0 * f64::from(frame)));
+        }
+        shot.edit(SHOT, "motion = \"grooms/ball.csv\"", "frames = \"anim/ball.####.ply\"");
+        open(shot)
+    });
+    type Hairs = BTreeMap<u64, Vec<[f32; 3]>>;
+    let (mut before, mut most, mut worst) = (None::<(Hairs, Hairs)>, 0.0f64, 0.0f64);
+    for frame in 1..=6 {
+        let now = (over(&plain, frame), over(&curled, frame));
+        if let Some((straight, bent)) = &before {
+            for (id, b) in &now.1 {
+                let (a, s, t) = (&bent[id], &straight[id], &now.0[id]);
+                // How far segments of the middle line turn from frame to frame, at most up to each point.
+                let mut turn = 0.0f64;
+                for k in 1..13 {
+                    turn = turn.max(angle(&minus(&s[k], &s[k - 1]), &minus(&t[k], &t[k - 1])));
+                    let (o, p) = (minus(&a[k], &s[k]), minus(&b[k], &t[k]));
+                    // Where curls begin at the root offsets are too small to have a direction.
+                    if norm(&o) > 0.03 && norm(&p) > 0.03 {
+                        most = most.max(angle(&o, &p));
+                        worst = worst.max(angle(&o, &p) - 2.0 * turn);
+                    }
+                }
+            }
+        }
+        before = Some(now);
     }
-    let folder = docs().join("pictures/look");
-    let files = std::fs::read_dir(&folder).expect("pictures").map(|f| f.expect("a file").file_name());
-    let files: BTreeSet<String> = files.map(|f| f.to_string_lossy().into_owned()).collect();
-    let wanted: BTreeSet<String> = parameters().map(Shown::file).collect();
-    assert_eq!(files, wanted, "run the example parameter_pictures");
-    for name in &wanted {
-        assert!(text.contains(&format!("(pictures/look/{name})")), "docs/look.md does not show {name}");
+    assert!(most > 0.01, "nothing turned");
+    assert!(
+        most < 0.2 && worst < 0.05,
+        "offsets turn by {most} rad in a frame, {worst} more than twice the hair's turn"
+    );
+}
+
+#[test]
+fn edits_of_maps_of_the_look_touch_only_hairs_under_them() {
+    let block = |x: u32, y: u32| (96..128).contains(&x) && (96..128).contains(&y);
+    let paint = |x: u32, y: u32| (128 + (x + y) % 32) as u8;
+    let look = "[[layer.clump]]\ndensity = 0.25\npercent = { value = 0.9, map = \"../maps/percent.png\" }\n\
+                [layer.curl]\nkind = \"helix\"\npitch = 0.8\nradius = { value = 0.2, map = \"../maps/radius.png\" }\n";
+    let shot = with_look(1, look);
+    let maps = ["maps/percent.png", "maps/radius.png"];
+    maps.iter().for_each(|m| shot.write(m, grey_png(256, 256, paint)));
+    let shot = open(shot);
+    let hairs = |shot: &ShotFolder| pelage_tests::exported_hairs(&shot.path().join("out/ball/hair.mcap"));
+    let before = hairs(&shot);
+    for map in maps {
+        shot.write(map, grey_png(256, 256, |x, y| if block(x, y) { 20 } else { paint(x, y) }));
+        shot.report(&["--to", "export"]);
+        let after = hairs(&shot);
+        let (mut inside, mut changed) = (0, 0);
+        for (key, hair) in &before {
+            let [u, v] = hair.uv().map(|x| 256.0 * x);
+            let under = (95.0..=129.0).contains(&u) && (127.0..=161.0).contains(&v);
+            inside += usize::from(under);
+            changed += usize::from(after[key] != *hair);
+            assert!(under || after[key] == *hair, "hair {key:?} outside the edit of {map} is another");
+        }
+        assert!(inside > 3 && changed > 0, "{changed} of {inside} hairs under the edit of {map} changed");
+        shot.write(map, grey_png(256, 256, paint));
     }
 }
 
 #[test]
-fn examples_of_the_page_are_valid() {
-    let text = std::fs::read_to_string(docs().join("look.md")).expect("docs/look.md");
-    let blocks: Vec<&str> = text.split("```toml\n").skip(1).filter_map(|b| b.split("```").next()).collect();
-    assert!(blocks.len() >= 3, "{} examples", blocks.len());
-    let layer = "[control]\nplacement = { per_cm2 = 1.0 }\n[[layer]]\nname = \"scalp\"\ndensity = { value = 1.0 }\n\
-                 length = { value = 1.0 }\n";
-    let shot = "[shot]\nname = \"a\"\nframes = [1, 2]\nfps = 24\nmeters_per_unit = 0.01\n[skin]\nrest = \"a.ply\"\n[groom]\nfile = \"a\"\n";
-    for block in blocks {
-        let path = Path::new("docs/look.md");
-        let checked = if block.contains("[look]") {
-            Document::<ShotFile>::parse(path, format!("{shot}{block}")).and_then(|d| d.check())
-        } else {
-            let before = if block.contains("[control]") { "" } else { layer };
-            Document::<GroomFile>::parse(path, format!("{before}{block}")).and_then(|d| d.check())
-        };
-        checked.unwrap_or_else(|e| panic!("{e}\n{block}"));
+fn wet_hair_is_wider_where_particles_have_hit() {
+    let shot = look_shot(COMMAND, 4);
+    let report = shot.report(&["--to", "export"]);
+    let counts = |report: &serde_json::Value| {
+        let counts = &report["stages"].as_array().expect("stages")[3]["counts"];
+        ["on", "past"].map(|n| counts[&format!("particles {n} the skin")].as_u64().expect("a count"))
+    };
+    // Two a frame, all of which hit the ball: counted once, not once a frame.
+    assert_eq!(counts(&report), [8, 0], "{report}");
+    let under = |frame: i32| layers(&shot, frame).into_iter().find(|l| l.name == "under").expect("the layer");
+    let mut seen = 0;
+    for frame in 1..=4 {
+        let layer = under(frame);
+        let dry = (0..layer.strands.len()).filter(|i| layer.width[layer.strands.offsets.range(*i).start] < 41e-4);
+        let wet = layer.strands.len() - dry.count();
+        assert!(wet >= seen && wet < layer.strands.len() / 2, "{wet} wet hairs at frame {frame}, {seen} before");
+        seen = wet;
     }
-    let groom = Document::<GroomFile>::read(&docs().join("look-bust.toml")).and_then(|d| d.check());
-    groom.unwrap_or_else(|e| panic!("{e}"));
-}
-
-#[test]
-fn hairs_come_to_a_line_drawn_by_hand() {
-    let shown = parameters().find(|s| s.key == "clump.curves").expect("a line drawn by hand");
-    let shot = ShotFolder::new(env!("CARGO_BIN_EXE_pelage-under-test"));
-    // All of the way, along a line that leaves the hair that carries it.
-    shown.files(shown.settings[1]).iter().for_each(|(name, bytes)| shot.write(name, bytes));
-    shot.edit("pipeline.toml", "formats = []", "formats = [\"mcap\"]");
-    shot.succeed(&["run", "--quiet"]);
-    let mut read = read_hair_mcap(&shot.path().join("out/shown/hair.mcap")).expect("an exported file");
-    let (layer, frame) = (read.layer(0).expect("a layer"), read.frame(0, 0).expect("a frame"));
-    let tips = (0..layer.id.len()).map(|h| frame.position[layer.offsets.range(h).end - 1]);
-    let there = |p: [f32; 3]| [1.2, 1.5, 0.5].iter().zip(p).all(|(a, b)| (a - b).abs() < 1e-4);
-    let found = tips.filter(|p| there(*p)).count();
-    assert!(found > 50, "{found} of {} hairs end where the line does", layer.id.len());
+    assert!(seen > 5, "{seen} wet hairs");
+    shot.edit(GROOM, "spread = 10", "spread = 180\nframes = [-3, 2]");
+    let report = shot.report(&["--to", "export"]);
+    let [on, past] = counts(&report);
+    assert!(on + past == 4 && past > 0, "{on} and {past} particles");
+    assert!(report.to_string().contains("emitter hose: particles that leave before frame 1 open no areas"), "{report}");
 }

@@ -4,6 +4,8 @@
 use pelage_tests::{ExportedHair, ShotFolder, ascii_ply, deformed, exported_hairs, grey_png, small_shot};
 use std::collections::{BTreeMap, BTreeSet};
 
+mod look;
+
 const COMMAND: &str = env!("CARGO_BIN_EXE_pelage-under-test");
 const GROOM: &str = "grooms/ball.toml";
 const SHOT: &str = "pipeline.toml";
@@ -57,11 +59,14 @@ fn ran(report: &serde_json::Value) -> BTreeMap<String, u64> {
 fn tally(steps: &BTreeSet<String>) -> BTreeMap<String, u64> {
     let of = |stage: &str| -> Vec<&String> { steps.iter().filter(|s| s.starts_with(&format!("{stage}/"))).collect() };
     let last = |s: &String| s.rsplit('/').next().expect("a name").to_owned();
-    let frames: BTreeSet<String> = of("interpolate").into_iter().map(last).filter(|f| f != "rest").collect();
+    let frames: BTreeSet<String> =
+        of("interpolate").into_iter().map(last).filter(|f| f != "rest" && f != "finished").collect();
+    // Every stretch is simulated from the first on here.
+    let simulated = if of("simulate").is_empty() { 0 } else { frames.len() as u64 };
     let once = |stage| (stage, u64::from(!of(stage).is_empty()));
     let each = |stage| (stage, of(stage).len() as u64);
     let frames = ("interpolate", frames.len() as u64);
-    let all = [once("groom"), once("instance"), ("simulate", 0), frames, each("export"), each("preview")];
+    let all = [once("groom"), once("instance"), ("simulate", simulated), frames, each("export"), each("preview")];
     all.map(|(name, n)| (name.to_owned(), n)).into()
 }
 

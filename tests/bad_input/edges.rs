@@ -8,7 +8,7 @@ use pelage_tests::{ShotFolder, ascii_ply, grey_png, small_shot};
 const GROOM: &str = "grooms/ball.toml";
 
 /// Runs a shot that must work, twice, and returns what it exported, layer by layer.
-fn works(shot: &ShotFolder) -> Vec<curves::CurveSet> {
+pub(super) fn works(shot: &ShotFolder) -> Vec<curves::CurveSet> {
     let said = run_bounded(shot.path(), &["run"]);
     assert_eq!(said.code, Some(0), "{}", said.err);
     assert!(!said.err.contains("panicked") && !said.err.contains("NaN"), "{}", said.err);

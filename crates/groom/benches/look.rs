@@ -87,10 +87,13 @@ fn measure(hairs: usize, points: usize) {
         clump(points, &clump_of(m, &id, &percent, rate, splay), &line, out);
     };
     tell("a level of clumps", on(&base, &mut out, |out| one(&fine, out, 0.3, 0.0)));
-    tell("two levels of clumps", on(&base, &mut out, |out| {
-        one(&fine, out, 0.3, 0.2);
-        one(&coarse, out, 0.0, 0.0);
-    }));
+    tell(
+        "two levels of clumps",
+        on(&base, &mut out, |out| {
+            one(&fine, out, 0.3, 0.2);
+            one(&coarse, out, 0.0, 0.0);
+        }),
+    );
     let curls = |keep_length| Curl {
         wave: helix(),
         radius: Param { value: 0.2, factor: &percent, shift: &[] },

@@ -2,7 +2,9 @@
 
 use crate::Error;
 use crate::cache::FileHashes;
-use crate::config::{BodyKind, BodyMesh, Document, Emitter, Feature, GroomFile, Keyed, Material, SEGMENTS, ShotFile, Target};
+use crate::config::{
+    BodyKind, BodyMesh, Document, Emitter, Feature, GroomFile, Key, Keyed, Material, SEGMENTS, ShotFile, Target,
+};
 use crate::format::csv;
 use pelage_geom::RigidMotion;
 use pelage_geom::motion::RigidTransform;
@@ -178,8 +180,14 @@ impl Project {
         Ok(Project { shot, groom, share, rest, curves, bodies, drawn, frames, before, motion, particles, maps })
     }
 
-    /// The same shot with `percent` of its hairs, in (0, 100], or as many as its clumps need: a smaller density keeps the first of the candidates, so each
-    /// of these hairs is one of the shot's, and as even over the skin. Hair from a curves file stays as it is.
+    /// True for a part of the shot's hairs ([`Project::thinned`]).
+    pub fn is_draft(&self) -> bool {
+        self.share.iter().any(|s| *s != 1.0)
+    }
+
+    /// The same shot with `percent` of its hairs, in (0, 100], or as many as its clumps need: a smaller density keeps the
+    /// first of the candidates, so each of these hairs is one of the shot's, and as even over the skin. Hair from a curves
+    /// file stays as it is.
     pub fn thinned(&self, percent: f64) -> Project {
         let mut out = self.clone();
         for (layer, share) in out.groom.value.layer.iter_mut().zip(&mut out.share) {
@@ -269,8 +277,14 @@ impl Project {
 
     /// True if hair is clumped where particles hit the skin.
     pub fn has_areas(&self) -> bool {
-        let clumps = self.groom.value.layer.iter().flat_map(|l| &l.clump);
-        self.shot.value.look.clump && clumps.into_iter().any(|c| !c.areas.is_empty())
+        (0..self.groom.value.emitter.len()).any(|k| self.opens_areas(k))
+    }
+
+    /// True if clumps act where the particles of an emitter hit the skin.
+    pub fn opens_areas(&self, emitter: usize) -> bool {
+        let name = &self.groom.value.emitter[emitter].name;
+        let mut clumps = self.groom.value.layer.iter().flat_map(|l| &l.clump);
+        self.shot.value.look.clump && clumps.any(|c| c.areas.contains(name))
     }
 
     /// Number of the frame whose keys hold: at rest, the shot's first.
@@ -329,11 +343,15 @@ fn check_overrides(shot: &Document<ShotFile>, groom: &Document<GroomFile>) -> Re
             return Err(shot.error(&format!("{at}.layer"), what, "name a [[layer]] of the groom file").into());
         };
         if o.clump >= layer.clump.len() {
-            let what = format!("layer {} has {} levels of clumps", o.layer, layer.clump.len());
-            return Err(shot.error(&format!("{at}.clump"), what, "they are numbered from 0").into());
+            let what = format!("layer {} has no level {} of clumps", o.layer, o.clump);
+            return Err(shot.error(&format!("{at}.clump"), what, "levels are numbered from 0").into());
+        }
+        if o.percent.is_none() && o.rate.is_none() {
+            return Err(shot.error(&at, "changes nothing", "give percent or rate, or take it out").into());
         }
         for (key, keyed) in [("percent", &o.percent), ("rate", &o.rate)] {
-            let fine = |k: &Keyed<f64>| k.in_order() && k.0.iter().all(|k| (0.0..=1.0).contains(&k.value));
+            let within = |k: &Key<f64>| (0.0..=1.0).contains(&k.value) && k.frame.is_finite();
+            let fine = |k: &Keyed<f64>| k.in_order() && k.0.iter().all(within);
             if !keyed.iter().all(fine) {
                 let help = "a number, or key frames in order";
                 return Err(shot.error(&format!("{at}.{key}"), "must be between 0 and 1", help).into());

@@ -50,7 +50,13 @@ pub fn rest_axes(
 }
 
 /// Axes carried by the skin into a pose, in the world.
-pub fn carried(mesh: &Mesh, topology: &Topology, now: &Pose, root: &[SurfacePoint], local: &[RootAxes]) -> Vec<RootAxes> {
+pub fn carried(
+    mesh: &Mesh,
+    topology: &Topology,
+    now: &Pose,
+    root: &[SurfacePoint],
+    local: &[RootAxes],
+) -> Vec<RootAxes> {
     let carry = |(p, a): (&SurfacePoint, &RootAxes)| {
         let f = now.frame(mesh, topology, p);
         let world = |v: [f32; 3]| {

@@ -73,8 +73,20 @@ impl Wave {
     }
 
     /// No offset.
-    pub const NONE: Wave =
-        Wave { a: 0.0, b: 0.0, alpha: 0.0, c: 0.0, beta: 0.0, d: 0.0, gamma: 0.0, t0: 0.0, r: 0.0, p0: 0.0, phase: 0.0, bias: 0.0 };
+    pub const NONE: Wave = Wave {
+        a: 0.0,
+        b: 0.0,
+        alpha: 0.0,
+        c: 0.0,
+        beta: 0.0,
+        d: 0.0,
+        gamma: 0.0,
+        t0: 0.0,
+        r: 0.0,
+        p0: 0.0,
+        phase: 0.0,
+        bias: 0.0,
+    };
 
     const SINE: Wave = Wave { a: 1.0, p0: 1.0, ..Wave::NONE };
 }

@@ -95,9 +95,8 @@ pub(crate) fn sin_cos_turn(x: F) -> (F, F) {
     let a = (x - quarter * F::splat(0.25)) * F::splat(std::f32::consts::TAU);
     let a2 = a * a;
     let c = |v: f32| F::splat(v);
-    let s = a
-        * (c(1.0)
-            + a2 * (c(-1.0 / 6.0) + a2 * (c(1.0 / 120.0) + a2 * (c(-1.0 / 5040.0) + a2 * c(1.0 / 362_880.0)))));
+    let s =
+        a * (c(1.0) + a2 * (c(-1.0 / 6.0) + a2 * (c(1.0 / 120.0) + a2 * (c(-1.0 / 5040.0) + a2 * c(1.0 / 362_880.0)))));
     let k = c(1.0) + a2 * (c(-0.5) + a2 * (c(1.0 / 24.0) + a2 * (c(-1.0 / 720.0) + a2 * c(1.0 / 40_320.0))));
     let odd: F = bytemuck::cast(U::splat(0) - (q & U::splat(1)));
     let (sin, cos) = (odd.bitselect(k, s), odd.bitselect(s, k));
@@ -234,7 +233,8 @@ mod tests {
             let (s, c) = sin_cos_turn(F::from(x));
             for (l, x) in x.iter().enumerate() {
                 let a = f64::from(*x) * std::f64::consts::TAU;
-                let off = (f64::from(s.to_array()[l]) - libm::sin(a)).abs() + (f64::from(c.to_array()[l]) - libm::cos(a)).abs();
+                let off = (f64::from(s.to_array()[l]) - libm::sin(a)).abs()
+                    + (f64::from(c.to_array()[l]) - libm::cos(a)).abs();
                 assert!(off < 2e-6, "{x}");
             }
         }

@@ -4,8 +4,8 @@ use super::axes::{Beside, RootAxes};
 use super::lanes::{Block, F, LANES, U, V, perlin1, perlin3};
 use super::perlin::key;
 use super::{CHUNK, Param, lanes};
-use pelage_geom::StrandId;
 use crate::along::at_points;
+use pelage_geom::StrandId;
 use rayon::prelude::*;
 
 /// Root mean square of [`super::perlin::perlin1`].

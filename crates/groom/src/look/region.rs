@@ -13,6 +13,7 @@ pub fn regions(sites: &Sites, value: &[f32], near: f32, open: &[bool]) -> Member
     let mut parent: Vec<u32> = (0..n as u32).collect();
     let mut order: Vec<u32> = (0..n as u32).filter(|&h| open.get(h as usize).copied().unwrap_or(true)).collect();
     // Hairs in slices of x as thick as a step: only slices beside each other can be joined.
+    // Steps of almost nothing have more slices than there are numbers: the last ones are one.
     let slice = |h: u32| (sites.position[h as usize][0] / near).floor() as i64;
     order.sort_by(|&a, &b| {
         let key = |h: u32| (slice(h), sites.position[h as usize][1]);
@@ -20,7 +21,7 @@ pub fn regions(sites: &Sites, value: &[f32], near: f32, open: &[bool]) -> Member
     });
     let mut first = 0;
     for (k, &a) in order.iter().enumerate() {
-        while slice(order[first]) + 1 < slice(a) {
+        while slice(order[first]).saturating_add(1) < slice(a) {
             first += 1;
         }
         // Hairs of the slice before and of its own, within a step in y.

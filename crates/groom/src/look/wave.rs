@@ -110,15 +110,13 @@ pub fn root_variable(hairs: &Drawn, v: &RootVariable) -> Vec<f32> {
 pub fn wave(points: usize, w: &Waves, position: &mut [[f32; 3]]) {
     let stations = station_weights(5, points);
     let name = |what: &str, axis: usize| key(w.seed ^ channel(what), axis as u64, w.channel);
-    let names: [[u32; 3]; 2] =
-        std::array::from_fn(|a| [name("amplitude", a), name("frequency", a), name("phase", a)]);
+    let names: [[u32; 3]; 2] = std::array::from_fn(|a| [name("amplitude", a), name("frequency", a), name("phase", a)]);
     position.par_chunks_mut(CHUNK * points).enumerate().for_each(|(chunk, out)| {
         let (mut along, mut block) = (Beside::default(), Block::default());
         for (b, hairs) in out.chunks_mut(LANES * points).enumerate() {
             let lane = lanes(chunk * CHUNK + b * LANES, hairs.len() / points);
-            let own: [[Own; LANES]; 2] = std::array::from_fn(|a| {
-                lane.map(|h| Own::new(&w.axis[a], names[a], w.r[h], w.strength.of(h)))
-            });
+            let own: [[Own; LANES]; 2] =
+                std::array::from_fn(|a| lane.map(|h| Own::new(&w.axis[a], names[a], w.r[h], w.strength.of(h))));
             let still = |l: usize| own[0][l].amplitude == [0.0; 5] && own[1][l].amplitude == [0.0; 5];
             let active: [bool; LANES] = std::array::from_fn(|l| !still(l));
             if active == [false; LANES] {

@@ -61,11 +61,7 @@ impl Case {
 fn hairs_of_four_points_follow_the_printed_formula() {
     let case = case(500, 4);
     for (percent, rate) in [(0.7, 0.0), (1.0, 0.3), (1.0, 1.0), (0.25, 0.5)] {
-        let found = case.run(&Clump {
-            percent: Param::constant(percent),
-            rate: Param::constant(rate),
-            ..case.clump()
-        });
+        let found = case.run(&Clump { percent: Param::constant(percent), rate: Param::constant(rate), ..case.clump() });
         let plain = |i: usize| {
             let (h, cv, p) = (i / 4, i % 4, double(case.position[i]));
             let fract = cv as f64 / 3.0;
@@ -146,8 +142,7 @@ fn the_profile_of_a_clump_is_as_it_says() {
     assert!((0..=20).all(|k| splay[h * 41 + k] == plain[h * 41 + k]));
     assert!((0.001..=0.6).contains(&left(&splay, tip)));
     // Weave turns about the centre: distances from it stay.
-    let weave =
-        case.run(&Clump { weave: Param::constant(2.0), percent: Param::constant(0.5), ..case.clump() });
+    let weave = case.run(&Clump { weave: Param::constant(2.0), percent: Param::constant(0.5), ..case.clump() });
     let half = case.run(&Clump { percent: Param::constant(0.5), ..case.clump() });
     assert!((0..41).all(|k| (left(&weave, k) - left(&half, k)).abs() < 1e-4));
     assert!((0..41).any(|k| (double(weave[h * 41 + k]) - double(half[h * 41 + k])).norm() > 0.05));

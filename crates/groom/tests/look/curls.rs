@@ -90,7 +90,10 @@ fn a_helix_has_the_radius_and_the_pitch_asked_for() {
             for w in hair[from..].windows(2) {
                 let polar = |p: [f32; 3]| (f64::from(p[0]) - centre.0, f64::from(p[2]) - centre.1);
                 let ((x, z), (a, b)) = (polar(w[0]), polar(w[1]));
-                assert!(((x * x + z * z).sqrt() / f64::from(radius) - 1.0).abs() < 0.01, "{radius} {pitch} {keep_length}");
+                assert!(
+                    ((x * x + z * z).sqrt() / f64::from(radius) - 1.0).abs() < 0.01,
+                    "{radius} {pitch} {keep_length}"
+                );
                 turns += (x * b - z * a).atan2(x * a + z * b) / TAU;
             }
             let height = f64::from(hair[points - 1][1] - hair[from][1]);
@@ -120,7 +123,11 @@ fn the_other_types_are_what_they_are_called() {
         hair.iter().map(at).collect::<Vec<_>>()
     };
     let plane = offsets(uniplanar());
-    assert!(plane.iter().all(|o| o[1].abs() < 1e-6) && plane.iter().any(|o| o[0] > 0.39) && plane.iter().any(|o| o[0] < -0.39));
+    assert!(
+        plane.iter().all(|o| o[1].abs() < 1e-6)
+            && plane.iter().any(|o| o[0] > 0.39)
+            && plane.iter().any(|o| o[0] < -0.39)
+    );
     let dish = offsets(dished(0.5));
     assert!(dish.iter().all(|o| o[1] > -1e-6) && dish.iter().any(|o| o[1] > 0.19));
     // Twice in a turn it is at the bottom, where the wave crosses the middle.
@@ -138,7 +145,8 @@ fn curls_get_tighter_toward_the_tip() {
     let axes = axes(points, &hair);
     let c = Curl { tighten: Param::constant(1.0), ..settings(uniplanar(), 0.1, 1.0, &axes) };
     curl(points, &c, &mut hair);
-    let crossings: Vec<f32> = hair.windows(2).filter(|w| (w[0][2] + 0.25) * (w[1][2] + 0.25) < 0.0).map(|w| w[0][1]).collect();
+    let crossings: Vec<f32> =
+        hair.windows(2).filter(|w| (w[0][2] + 0.25) * (w[1][2] + 0.25) < 0.0).map(|w| w[0][1]).collect();
     let n = crossings.len();
     let (first, last) = (crossings[2] - crossings[0], crossings[n - 1] - crossings[n - 3]);
     // The local frequency goes from 1 to 2.

@@ -22,8 +22,7 @@ fn members_are_those_of_brute_force() {
     let (position, normal) = sphere(4000);
     for (step, size, vary) in [(40, 0.9, 0.0), (40, 0.9, 0.6), (7, 0.2, 0.3), (400, 30.0, 0.0), (5, 2.0, 0.9)] {
         let centre = every(4000, step);
-        let radius: Vec<f32> =
-            centre.iter().map(|h| (size * (1.0 + vary * r(12, u64::from(*h), 0))) as f32).collect();
+        let radius: Vec<f32> = centre.iter().map(|h| (size * (1.0 + vary * r(12, u64::from(*h), 0))) as f32).collect();
         let open: Vec<bool> = (0..4000).map(|h| h % 13 != 5).collect();
         let spacing = 10.0 * (std::f64::consts::PI * step as f64 / 4000.0).sqrt() as f32;
         for open in [&open[..], &[]] {
@@ -53,8 +52,7 @@ fn equally_near_centres_are_taken_in_order_and_sides_do_not_mix() {
 #[test]
 fn no_clump_crosses_a_parting() {
     let n = 3000;
-    let position: Vec<[f32; 3]> =
-        (0..n).map(|i| [4.0 * r(21, i, 0) as f32, 0.0, 4.0 * r(21, i, 1) as f32]).collect();
+    let position: Vec<[f32; 3]> = (0..n).map(|i| [4.0 * r(21, i, 0) as f32, 0.0, 4.0 * r(21, i, 1) as f32]).collect();
     let normal = vec![[0.0, 1.0, 0.0]; n as usize];
     let line = vec![vec![V::new(0.0, 0.0, -3.0), V::new(0.3, 0.0, 0.0), V::new(0.0, 0.0, 3.0)]];
     let bare = Sites { position: &position, normal: &normal, side: &[] };

@@ -40,7 +40,8 @@ fn waves_are_those_of_the_printed_formulas() {
         };
         let mut found = position.clone();
         wave(points, &w, &mut found);
-        let random = |what: &str, a: usize, i: u32, x: f32| f64::from(perlin1(key(5 ^ channel(what), a as u64, 6) ^ i, x));
+        let random =
+            |what: &str, a: usize, i: u32, x: f32| f64::from(perlin1(key(5 ^ channel(what), a as u64, 6) ^ i, x));
         let curve = |v: [f64; 5], l: f64| {
             // Catmull-Rom through stations at 0, 1/4 .. 1, the ends' slopes of the parabola.
             let x = (l * 4.0).min(4.0);
@@ -52,7 +53,8 @@ fn waves_are_those_of_the_printed_formulas() {
                 j => 0.5 * (v[j + 1] - v[j - 1]),
             };
             let (a, b) = (v[i], v[i + 1]);
-            a + (b - a) * t * t * (3.0 - 2.0 * t) + slope(i) * t * (1.0 - t) * (1.0 - t) - slope(i + 1) * t * t * (1.0 - t)
+            a + (b - a) * t * t * (3.0 - 2.0 * t) + slope(i) * t * (1.0 - t) * (1.0 - t)
+                - slope(i + 1) * t * t * (1.0 - t)
         };
         let mut expected = Vec::new();
         for h in 0..n {
@@ -67,18 +69,22 @@ fn waves_are_those_of_the_printed_formulas() {
                 let l = arc / total;
                 let at = |a: usize| {
                     let value = |what: &str, s: &Stations, i: usize| {
-                        f64::from(s.mean[i]) + f64::from(s.deviation[i]) * random(what, a, i as u32 + 1, r[h] * s.scale[i])
+                        f64::from(s.mean[i])
+                            + f64::from(s.deviation[i]) * random(what, a, i as u32 + 1, r[h] * s.scale[i])
                     };
                     let amplitude: Vec<f64> = (0..4).map(|i| 0.8 * value("amplitude", &axis[a].amplitude, i)).collect();
                     let t: Vec<f64> = (0..4).map(|i| value("frequency", &axis[a].frequency, i)).collect();
                     let p = axis[a].phase;
                     let phase = f64::from(p[0]) + f64::from(p[1]) * random("phase", a, 0, r[h] * p[2]);
-                    let amplitude = curve([0.0, amplitude[0], amplitude[1], amplitude[2], amplitude[3]], k as f64 / 24.0);
+                    let amplitude =
+                        curve([0.0, amplitude[0], amplitude[1], amplitude[2], amplitude[3]], k as f64 / 24.0);
                     let turns = phase + curve([t[0], t[0], t[1], t[2], t[3]], k as f64 / 24.0) * l;
                     amplitude
                         * match shape {
                             Shape::Sine => (TAU * turns).sin(),
-                            Shape::Noise => f64::from(perlin1(key(5 ^ channel("phase"), a as u64, 6) ^ 0x5bd1_e995, turns as f32)),
+                            Shape::Noise => {
+                                f64::from(perlin1(key(5 ^ channel("phase"), a as u64, 6) ^ 0x5bd1_e995, turns as f32))
+                            }
                         }
                 };
                 expected.push(double(hair[k]) + frames[k][1] * at(0) + frames[k][2] * at(1));
@@ -199,7 +205,8 @@ fn wind_keeps_lengths_and_roots_and_changes_smoothly_in_time() {
     for (a, b) in now.chunks_exact(points).zip(position.chunks_exact(points)) {
         assert!((length(a) - length(b)).abs() < 1e-5 * length(b) && a[0] == b[0]);
     }
-    let drift: f64 = (0..n).map(|h| f64::from(now[h * points + 11][0] - position[h * points + 11][0])).sum::<f64>() / n as f64;
+    let drift: f64 =
+        (0..n).map(|h| f64::from(now[h * points + 11][0] - position[h * points + 11][0])).sum::<f64>() / n as f64;
     assert!((0.4..0.9).contains(&drift), "{drift}");
     let (soon, later) = (blown(1.0 + 1.0 / 96.0, 0.8), blown(2.0, 0.8));
     let moved = |a: &[[f32; 3]]| apart(a, &now.iter().map(|p| double(*p)).collect::<Vec<_>>());

@@ -298,7 +298,8 @@ fn write(out: &Path, target: Target, source: &mut Source, drawn: &[Vec<[f32; 3]>
     }
     let (facts, layers) = (&source.facts, &source.layers);
     let frames = source.position.iter().zip(&source.velocity);
-    let frame: Vec<HairFrame<'_>> = frames.map(|(position, velocity)| HairFrame { position, velocity, ..HairFrame::default() }).collect();
+    let frame: Vec<HairFrame<'_>> =
+        frames.map(|(position, velocity)| HairFrame { position, velocity, ..HairFrame::default() }).collect();
     let part = unfinished(out);
     let written = || match target {
         Target::Ply => ply::write_hair(&part, facts, layers, &frame),

@@ -7,6 +7,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer};
 use std::path::PathBuf;
 
+/// Most points of a hair: a hundred turns of a curl with forty points each.
+pub const MOST_POINTS: usize = 4096;
+
 /// A look: control hairs and the layers of hair that follow them.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -566,8 +569,8 @@ impl Document<GroomFile> {
 
     fn points(&self, key: &str, points: Option<usize>) -> Result<(), ConfigError> {
         match points {
-            Some(n) if !(2..=4096).contains(&n) => {
-                Err(self.error(key, "must be between 2 and 4096", "8 to 16 is usual"))
+            Some(n) if !(2..=MOST_POINTS).contains(&n) => {
+                Err(self.error(key, format!("must be between 2 and {MOST_POINTS}"), "8 to 16 is usual"))
             }
             _ => Ok(()),
         }

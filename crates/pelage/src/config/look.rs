@@ -5,9 +5,11 @@ use super::document::{ConfigError, Document, Fixed, exactly};
 use super::simulate::{Keyed, Vector};
 use super::{Channel, GroomFile, Layer, MapRef, WrapMode};
 use schemars::JsonSchema;
-use serde::de::{Deserializer, Error as _};
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
+use std::fmt;
 use std::path::PathBuf;
 
 /// A number, key frames, or a table with a map and variation: `0.7`, `[{ frame = 1001, value = 0 }, ...]`,
@@ -51,7 +53,14 @@ impl LookValue {
     /// The same everywhere and always.
     pub fn constant(value: f64) -> Self {
         let value = Keyed::constant(value);
-        LookValue(VariedValue { value, map: None, channel: Channel::Grey, wrap: WrapMode::Clamp, noise: 0.0, vary: vec![] })
+        LookValue(VariedValue {
+            value,
+            map: None,
+            channel: Channel::Grey,
+            wrap: WrapMode::Clamp,
+            noise: 0.0,
+            vary: vec![],
+        })
     }
 
     /// Value at a frame number.
@@ -72,14 +81,35 @@ impl LookValue {
 
 impl<'de> Deserialize<'de> for LookValue {
     fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
-        let failed = |e: toml::de::Error| D::Error::custom(e.message());
-        match toml::Value::deserialize(d)? {
-            toml::Value::Table(t) => VariedValue::deserialize(t).map(LookValue).map_err(failed),
-            value => {
-                let value = Keyed::deserialize(value).map_err(failed)?;
-                Ok(LookValue(VariedValue { value, ..LookValue::constant(0.0).0 }))
-            }
-        }
+        d.deserialize_any(AnyOf)
+    }
+}
+
+/// Reads what is there without going through a tree of values, so that errors point into it.
+struct AnyOf;
+
+impl<'de> Visitor<'de> for AnyOf {
+    type Value = LookValue;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a number, key frames [{ frame, value }], or a table with a value")
+    }
+
+    fn visit_f64<E: serde::de::Error>(self, x: f64) -> Result<LookValue, E> {
+        Ok(LookValue::constant(x))
+    }
+
+    fn visit_i64<E: serde::de::Error>(self, x: i64) -> Result<LookValue, E> {
+        Ok(LookValue::constant(x as f64))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<LookValue, A::Error> {
+        let value = Keyed::deserialize(SeqAccessDeserializer::new(list))?;
+        Ok(LookValue(VariedValue { value, ..LookValue::constant(0.0).0 }))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, table: A) -> Result<LookValue, A::Error> {
+        VariedValue::deserialize(MapAccessDeserializer::new(table)).map(LookValue)
     }
 }
 
@@ -422,12 +452,20 @@ impl WaveAxis {
             ("frequency_deviation", self.frequency_deviation),
             ("frequency_scale", self.frequency_scale),
         ];
-        let phase = [
-            ("phase", self.phase),
-            ("phase_deviation", self.phase_deviation),
-            ("phase_scale", self.phase_scale),
-        ];
+        let phase =
+            [("phase", self.phase), ("phase_deviation", self.phase_deviation), ("phase_scale", self.phase_scale)];
         stations.into_iter().flat_map(|(key, v)| v.map(|x| (key, x))).chain(phase).collect()
+    }
+
+    /// Values by key as text, those of stations together.
+    pub fn settings(&self) -> Vec<(&'static str, String)> {
+        let values = self.values();
+        let same = values.chunk_by(|a, b| a.0 == b.0);
+        same.map(|s| match s {
+            [(key, x)] => (*key, x.to_string()),
+            _ => (s[0].0, format!("{:?}", s.iter().map(|v| v.1).collect::<Vec<_>>())),
+        })
+        .collect()
     }
 }
 
@@ -511,8 +549,7 @@ pub enum Operator {
 
 impl Operator {
     /// The order in which they act if a layer does not say otherwise.
-    pub const ALL: [Operator; 5] =
-        [Operator::Clump, Operator::Curl, Operator::Wave, Operator::Noise, Operator::Wind];
+    pub const ALL: [Operator; 5] = [Operator::Clump, Operator::Curl, Operator::Wave, Operator::Noise, Operator::Wind];
 }
 
 /// Particles that hit the skin and open areas of clumped (wet) hair.
@@ -751,7 +788,11 @@ impl Document<GroomFile> {
         if let Some(w) = &l.wind {
             let at = format!("{at}.wind");
             if !w.direction.iter().all(|x| x.is_finite()) || w.direction == [0.0; 3] {
-                return Err(self.error(&format!("{at}.direction"), "must be a direction", "for example [1.0, 0.0, 0.0]"));
+                return Err(self.error(
+                    &format!("{at}.direction"),
+                    "must be a direction",
+                    "for example [1.0, 0.0, 0.0]",
+                ));
             }
             self.within(&format!("{at}.size"), w.size, 1e-9, 1e9)?;
             self.within(&format!("{at}.frequency"), w.frequency, 0.0, 1e3)?;
@@ -781,7 +822,11 @@ impl Document<GroomFile> {
     fn check_clump(&self, at: &str, level: usize, c: &Clump) -> Result<(), ConfigError> {
         let given = [c.density.is_some(), c.regions.is_some(), c.roots.is_some(), c.curves.is_some()];
         if given.iter().filter(|g| **g).count() != 1 {
-            return Err(self.error(at, "does not say what its clumps are", "give one of density, regions, roots, curves"));
+            return Err(self.error(
+                at,
+                "does not say what its clumps are",
+                "give one of density, regions, roots, curves",
+            ));
         }
         for v in c.making() {
             if v.value.0.value.0.len() > 1 {
@@ -789,15 +834,21 @@ impl Document<GroomFile> {
                 return Err(self.error(&format!("{at}.{}", v.name), "can't have key frames", help));
             }
         }
-        let lines = c.curves.iter().flatten().map(|l| (l.as_slice(), 2)).chain(c.roots.iter().map(|r| (r.as_slice(), 1)));
-        for (line, least) in lines {
+        let none = c.roots.as_ref().is_some_and(Vec::is_empty) || c.curves.as_ref().is_some_and(Vec::is_empty);
+        let lines =
+            c.curves.iter().flatten().map(|l| (l.as_slice(), 2)).chain(c.roots.iter().map(|r| (r.as_slice(), 1)));
+        for (line, least) in lines.chain(none.then_some((&[][..], 1))) {
             if line.len() < least || !line.iter().flatten().all(|x| x.is_finite()) {
                 let what = "clumps placed by hand need finite points, a curve two or more";
                 return Err(self.error(at, what, "root first, at the rest pose, in scene units"));
             }
         }
         if c.of == Some(ClumpOf::Clumps) && level == 0 {
-            return Err(self.error(&format!("{at}.of"), "there is no level before the first", "list the finest level first"));
+            return Err(self.error(
+                &format!("{at}.of"),
+                "there is no level before the first",
+                "list the finest level first",
+            ));
         }
         self.within(&format!("{at}.taper"), c.taper, -1.0, 1.0)?;
         if let Some(d) = &c.dilation {
@@ -824,7 +875,11 @@ impl Document<GroomFile> {
             return Err(self.error(&format!("{at}.wet"), "a simulated level hands on its shape only", help));
         }
         if c.simulate && !c.areas.is_empty() {
-            return Err(self.error(&format!("{at}.simulate"), "areas come and go in the shot", "take one of the two out"));
+            return Err(self.error(
+                &format!("{at}.simulate"),
+                "areas come and go in the shot",
+                "take one of the two out",
+            ));
         }
         Ok(())
     }
@@ -886,7 +941,11 @@ impl Document<GroomFile> {
         for (i, e) in self.value.emitter.iter().enumerate() {
             let at = format!("emitter[{i}]");
             if e.name.is_empty() || self.value.emitter[..i].iter().any(|o| o.name == e.name) {
-                return Err(self.error(&format!("{at}.name"), "is empty or used twice", "name every emitter differently"));
+                return Err(self.error(
+                    &format!("{at}.name"),
+                    "is empty or used twice",
+                    "name every emitter differently",
+                ));
             }
             let own = [e.position.is_some(), e.direction.is_some()];
             if own != [e.file.is_none(); 2] {
@@ -895,24 +954,33 @@ impl Document<GroomFile> {
             }
             let finite = |v: &Vector| v.0.iter().all(|x| x.is_finite());
             if !e.position.iter().flat_map(|p| &p.0).all(|k| finite(&k.value)) {
-                return Err(self.error(&format!("{at}.position"), "must be three finite numbers", ""));
+                return Err(self.error(&format!("{at}.position"), "must be three finite numbers", "in scene units"));
             }
             if !e.direction.iter().all(|d| finite(d) && d.0 != [0.0; 3]) {
                 return Err(self.error(&format!("{at}.direction"), "must be a direction", "for example [0, -1, 0]"));
             }
+            let position = e.position.iter().flat_map(|p| &p.0);
+            position.map(|k| k.frame).try_for_each(|f| self.within(&format!("{at}.position"), f, -1e9, 1e9))?;
             if !e.position.iter().all(Keyed::in_order) {
                 let help = "each comes after the one before";
                 return Err(self.error(&format!("{at}.position"), "key frames are not in order", help));
             }
             if e.frames.is_some_and(|f| f[0] > f[1]) {
-                return Err(self.error(&format!("{at}.frames"), "the last frame comes before the first", ""));
+                return Err(self.error(
+                    &format!("{at}.frames"),
+                    "the last frame comes before the first",
+                    "first, last",
+                ));
             }
             self.within(&format!("{at}.spread"), e.spread, 0.0, 180.0)?;
             self.within(&format!("{at}.rate"), e.rate, 0.0, 1e5)?;
             for (key, v, most) in
                 [("radius", &e.radius, 1e6), ("percent", &e.percent, 1.0), ("clump_rate", &e.clump_rate, 1.0)]
             {
-                v.0.iter().try_for_each(|k| self.within(&format!("{at}.{key}"), k.value, 0.0, most))?;
+                for k in &v.0 {
+                    self.within(&format!("{at}.{key}"), k.value, 0.0, most)?;
+                    self.within(&format!("{at}.{key}"), k.frame, -1e9, 1e9)?;
+                }
                 if !v.in_order() {
                     let help = "each comes after the one before";
                     return Err(self.error(&format!("{at}.{key}"), "key frames are not in order", help));

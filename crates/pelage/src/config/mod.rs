@@ -8,12 +8,13 @@ mod simulate;
 
 pub use document::{ConfigError, Document};
 pub use groom::{
-    Channel, ColorFeature, Comb, CombKind, Control, Feature, GroomFile, Guard, Layer, MapRef, Parting, Placement,
+    Channel, ColorFeature, Comb, CombKind, Control, Feature, GroomFile, Guard, Layer, MOST_POINTS, MapRef, Parting,
+    Placement,
 };
 pub use groom::{Side, Space, WidthFeature, WrapMode};
 pub use look::{
-    Clump, ClumpOf, Collision, Curl, CurlKind, CurlWave, Dilation, Emitter, Look, LookOverride, LookValue, Noise, Operator, VaryScale,
-    Varied, VariedValue, Wave, WaveAxis, WaveShape, WindLook,
+    Clump, ClumpOf, Collision, Curl, CurlKind, CurlWave, Dilation, Emitter, Look, LookOverride, LookValue, Noise,
+    Operator, Varied, VariedValue, VaryScale, Wave, WaveAxis, WaveShape, WindLook,
 };
 pub use shot::{CacheSettings, Export, ExportFormat, GroomRef, Preview, Shot, ShotFile, Skin, UpAxis};
 pub use simulate::{

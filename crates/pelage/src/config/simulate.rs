@@ -3,9 +3,12 @@
 use super::document::{ConfigError, Document, Fixed, exactly};
 use super::{ShotFile, UpAxis};
 use schemars::JsonSchema;
-use serde::de::{DeserializeOwned, Deserializer, Error as _};
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{DeserializeOwned, Deserializer, Error as _, IntoDeserializer, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
+use std::fmt;
+use std::marker::PhantomData;
 
 /// Segments of a simulated hair of a groom: twice the 12 points that long control hair is combed with. Half as many bend
 /// in visible corners, twice as many cost twice the time.
@@ -253,6 +256,13 @@ impl BodyKind {
 #[serde(transparent)]
 pub struct Vector(#[serde(deserialize_with = "exactly")] pub [f64; 3]);
 
+impl fmt::Display for Vector {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [x, y, z] = self.0;
+        write!(f, "[{x}, {y}, {z}]")
+    }
+}
+
 /// A number, or three.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "expected a number, three numbers, or a list of { frame, value }")]
@@ -286,6 +296,17 @@ impl<T> Keyed<T> {
     /// True if there are keys, each after the one before.
     pub fn in_order(&self) -> bool {
         !self.0.is_empty() && self.0.windows(2).all(|k| k[0].frame < k[1].frame)
+    }
+}
+
+/// The value, or `[frame: value, ...]`.
+impl<T: fmt::Display> fmt::Display for Keyed<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let [k] = &self.0[..] {
+            return k.value.fmt(f);
+        }
+        let keys: Vec<String> = self.0.iter().map(|k| format!("{}: {}", k.frame, k.value)).collect();
+        write!(f, "[{}]", keys.join(", "))
     }
 }
 
@@ -337,14 +358,76 @@ impl Keyed<Vector> {
 
 impl<'de, T: DeserializeOwned> Deserialize<'de> for Keyed<T> {
     fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
-        use toml::Value;
-        let failed = |e: toml::de::Error| D::Error::custom(e.message());
-        match Value::deserialize(d)? {
-            Value::Array(keys) if keys.iter().any(Value::is_table) => {
-                keys.into_iter().map(|k| Key::deserialize(k).map_err(failed)).collect::<Result<_, _>>().map(Keyed)
+        d.deserialize_any(ValueOrKeys(PhantomData))
+    }
+}
+
+/// Reads what is there without going through a tree of values, so that errors point into it.
+struct ValueOrKeys<T>(PhantomData<T>);
+
+impl<'de, T: DeserializeOwned> Visitor<'de> for ValueOrKeys<T> {
+    type Value = Keyed<T>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a number, three numbers, or a list of { frame, value }")
+    }
+
+    fn visit_f64<E: serde::de::Error>(self, x: f64) -> Result<Keyed<T>, E> {
+        T::deserialize(x.into_deserializer()).map(Keyed::constant)
+    }
+
+    fn visit_i64<E: serde::de::Error>(self, x: i64) -> Result<Keyed<T>, E> {
+        self.visit_f64(x as f64)
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Keyed<T>, A::Error> {
+        let (mut numbers, mut keys) = (Vec::new(), Vec::new());
+        while let Some(item) = list.next_element::<Item<T>>()? {
+            match item {
+                Item::Number(x) => numbers.push(x),
+                Item::Key(k) => keys.push(k),
             }
-            value => T::deserialize(value).map(Keyed::constant).map_err(failed),
         }
+        match (numbers.len(), keys.len()) {
+            (0, 0) => Err(A::Error::invalid_length(0, &self)),
+            (0, _) => Ok(Keyed(keys)),
+            (_, 0) => T::deserialize(numbers.into_deserializer()).map(Keyed::constant),
+            _ => Err(A::Error::custom("key frames and numbers in one list")),
+        }
+    }
+}
+
+/// A number of a vector, or a key frame.
+enum Item<T> {
+    Number(f64),
+    Key(Key<T>),
+}
+
+impl<'de, T: DeserializeOwned> Deserialize<'de> for Item<T> {
+    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+        d.deserialize_any(ItemVisitor(PhantomData))
+    }
+}
+
+struct ItemVisitor<T>(PhantomData<T>);
+
+impl<'de, T: DeserializeOwned> Visitor<'de> for ItemVisitor<T> {
+    type Value = Item<T>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a number, or a key frame { frame, value }")
+    }
+
+    fn visit_f64<E: serde::de::Error>(self, x: f64) -> Result<Item<T>, E> {
+        Ok(Item::Number(x))
+    }
+
+    fn visit_i64<E: serde::de::Error>(self, x: i64) -> Result<Item<T>, E> {
+        Ok(Item::Number(x as f64))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, table: A) -> Result<Item<T>, A::Error> {
+        Key::deserialize(MapAccessDeserializer::new(table)).map(Item::Key)
     }
 }
 

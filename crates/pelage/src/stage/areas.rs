@@ -12,6 +12,7 @@ use crate::project::SkinAt;
 use pelage_geom::{Bvh, NONE, SurfacePoint};
 use pelage_groom::areas::{Area, AreaLaw, Centres, Emitter, Hit, Particle, areas, hits as find_hits, wetness};
 use pelage_groom::look::member::Members;
+use std::ops::Range;
 use std::rc::Rc;
 
 /// Hits of every emitter up to the end of a frame.
@@ -40,7 +41,14 @@ fn find(run: &mut Runner<'_>, frame: i32) -> Result<Hits, Error> {
         Some((before, _)) => hits(run, *before)?.to_vec(),
         None => vec![Vec::new(); emitters.len()],
     };
-    let particles = (0..emitters.len()).map(|k| particles(run, k, frame)).collect::<Result<Vec<_>, _>>()?;
+    let first = project.shot.value.shot.frames[0];
+    let particles = (0..emitters.len()).map(|k| particles(run, k, first..frame + 1)).collect::<Result<Vec<_>, _>>()?;
+    let launched: usize = particles.iter().map(Vec::len).sum();
+    let now = |p: Vec<Particle>| p.into_iter().filter(|p| p.time >= f64::from(frame)).collect();
+    let particles: Vec<Vec<Particle>> = particles.into_iter().map(now).collect();
+    if frame == first {
+        note_early(run, first)?;
+    }
     let at = &project.frames[&frame];
     if particles.iter().any(|p| !p.is_empty()) {
         let skin = groom::skin(run)?;
@@ -57,18 +65,23 @@ fn find(run: &mut Runner<'_>, frame: i32) -> Result<Hits, Error> {
             all.extend(find_hits(particles, bvh, placement));
         }
     }
-    let count = all.iter().map(|h| h.len() as u64).sum();
-    run.keep(What::Hits(frame), Counts::from([("particles on the skin".to_owned(), count)]), &[("data.ply", &write(&all))])?;
+    let on_skin: usize = all.iter().map(Vec::len).sum();
+    let counts = [("particles on the skin", on_skin), ("particles past the skin", launched - on_skin)];
+    let counts: Counts = counts.map(|(name, n)| (name.to_owned(), n as u64)).into();
+    run.keep(What::Hits(frame), counts, &[("data.ply", &write(&all))])?;
     Ok(all)
 }
 
-/// Particles of an emitter that leave between a frame and the next.
-fn particles(run: &Runner<'_>, k: usize, frame: i32) -> Result<Vec<Particle>, Error> {
+/// Particles of an emitter that leave from the start of `frames.start` to the start of `frames.end`.
+fn particles(run: &Runner<'_>, k: usize, frames: Range<i32>) -> Result<Vec<Particle>, Error> {
     let shot = &run.project.shot.value.shot;
     let e = &run.project.groom.value.emitter[k];
+    if !run.project.opens_areas(k) {
+        return Ok(Vec::new());
+    }
     if let Some(file) = &run.project.particles[k] {
         let all = csv::read_particles(&file.path, shot.fps)?;
-        let leaves = |p: &Particle| (f64::from(frame)..f64::from(frame) + 1.0).contains(&p.time);
+        let leaves = |p: &Particle| (f64::from(frames.start)..f64::from(frames.end)).contains(&p.time);
         return Ok(all.into_iter().filter(leaves).collect());
     }
     let keys = e.position.iter().flat_map(|p| p.vectors().0);
@@ -80,7 +93,23 @@ fn particles(run: &Runner<'_>, k: usize, frame: i32) -> Result<Vec<Particle>, Er
         seed: u64::from(e.seed),
         frames: e.frames.unwrap_or(shot.frames),
     };
-    Ok(emitter.particles(frame..frame + 1, shot.fps))
+    Ok(emitter.particles(frames, shot.fps))
+}
+
+/// Particles that leave before the shot begins meet no skin: that is told.
+fn note_early(run: &mut Runner<'_>, first: i32) -> Result<(), Error> {
+    for (k, e) in run.project.groom.value.emitter.iter().enumerate() {
+        let early = match e.file {
+            Some(_) => particles(run, k, i32::MIN..first)?.len(),
+            None if e.frames.is_some_and(|f| f[0] < first) && run.project.opens_areas(k) => 1,
+            None => 0,
+        };
+        if early > 0 {
+            let name = &e.name;
+            run.warnings.push(format!("emitter {name}: particles that leave before frame {first} open no areas"));
+        }
+    }
+    Ok(())
 }
 
 fn write(all: &Hits) -> Vec<u8> {

@@ -1,8 +1,8 @@
 //! Export: finished hair for other programs. Every file is written beside its place, read back and checked, and only
 //! then renamed.
 
-use super::run::{Counts, Runner};
 use super::plan_look::{finished_rest, is_wet};
+use super::run::{Counts, Runner};
 use super::{Step, What, curves, groom, instance, interpolate};
 use crate::Error;
 use crate::config::{ExportFormat, UpAxis};

@@ -1,7 +1,7 @@
 //! Interpolate: every hair at every frame, from control hairs on the skin of that frame.
 
-use super::run::{Counts, Runner};
 use super::look::{self, Displaced};
+use super::run::{Counts, Runner};
 use super::{What, curves, groom, instance, simulate};
 use crate::Error;
 use crate::config::Target;

@@ -1,7 +1,7 @@
 //! The look: what displaces a layer's hairs at rest or at a frame, part after part.
 
 use super::clumps::{self, RestSites};
-use super::plan_look::{Effect, collides, effects, overridden};
+use super::plan_look::{Effect, by_clump, collides, overridden};
 use super::run::{Counts, Runner};
 use super::skin::Texel;
 use super::{SkinPose, What, groom, instance, interpolate, layer_seed};
@@ -245,10 +245,7 @@ fn columns(
 
 /// For each hair the centre of its clump in the last level, or itself.
 fn representatives(run: &mut Runner<'_>, i: usize) -> Result<Vec<u32>, Error> {
-    let levels = run.project.groom.value.layer[i].clump.len();
-    let [simulated, after] = effects(run.project, i);
-    let acts = |k: &usize| simulated.iter().chain(&after).any(|e| *e == Effect::Clump(*k));
-    let Some(last) = (0..levels).rev().find(acts) else {
+    let Some(last) = by_clump(run.project, i) else {
         return Ok((0..instance::roots(run, i)?.id.len() as u32).collect());
     };
     let m = clumps::clumps(run, i, last)?;
@@ -269,9 +266,12 @@ fn note_coarse_curls(run: &mut Runner<'_>, i: usize, acting: &[Effect], points: 
     let found = (points - 1) as f64 / turns;
     if turns > 0.0 && found < SMOOTH {
         let enough = (turns * 2.0 * SMOOTH).ceil() as usize + 1;
+        let help = match enough {
+            0..=config::MOST_POINTS => format!("layer.points = {enough} draws them round"),
+            _ => format!("{} points draw no turn as short as {pitch}", config::MOST_POINTS),
+        };
         run.warnings.push(format!(
-            "layer {}: a turn of its curls has {found:.1} segments on the longest hair: layer.points = {enough} draws \
-             them round",
+            "layer {}: a turn of its curls has {found:.1} segments on the longest hair: {help}",
             layer.name
         ));
     }
@@ -325,6 +325,11 @@ impl<'a> Job<'a, '_> {
                     axes: self.axes,
                 };
                 curl(points, &settings, &mut self.out.position);
+                if !self.out.position.iter().flatten().all(|x| x.is_finite()) {
+                    let what = "the offset grows beyond all numbers on a hair as long as those of this layer";
+                    let help = "lower gamma, or move t0 to the tip";
+                    return Err(project.groom.error(&format!("layer[{}].curl", self.i), what, help).into());
+                }
             }
             Effect::Wave(k) => {
                 let w = &layer.wave[k];

@@ -5,6 +5,7 @@ use super::plan::{Plan, Reader, Step, What, layer_seed, version};
 use crate::cache::{Field, Recipe};
 use crate::config::{Clump, ClumpOf, Keyed, LookValue, Operator, Target, Varied};
 use crate::project::{Project, SkinAt};
+use std::fmt::Display;
 
 /// A part of the look that acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,6 +103,13 @@ pub fn overridden<'a>(project: &'a Project, i: usize, k: usize, v: &Varied<'a>) 
     })
 }
 
+/// The level of clumps whose hairs curl alike: the last that acts, before or after the simulation.
+pub fn by_clump(project: &Project, i: usize) -> Option<usize> {
+    let layer = &project.groom.value.layer[i];
+    let acts = |k: &usize| effects(project, i).iter().flatten().any(|e| *e == Effect::Clump(*k));
+    layer.curl.as_ref().filter(|c| c.per_clump).and_then(|_| (0..layer.clump.len()).rev().find(acts))
+}
+
 /// True if a level of clumps joins the clumps of the level before.
 pub fn joins_clumps(clump: &Clump, k: usize) -> bool {
     let default = if k == 0 { ClumpOf::Hairs } else { ClumpOf::Clumps };
@@ -144,10 +152,15 @@ impl Plan {
         for effect in effects {
             recipe = recipe.with(r.effect(i, *effect, frame));
             match effect {
+                // The rest pose is without areas.
+                Effect::Clump(k) if frame.is_none() && r.in_areas(i, *k) => {}
                 Effect::Clump(k) => {
                     reads.push(What::Clump(i, *k as u32));
-                    let areas = !r.project.groom.value.layer[i].clump[*k].areas.is_empty();
-                    reads.extend(frame.filter(|_| areas).map(What::Hits));
+                    reads.extend(frame.filter(|_| r.in_areas(i, *k)).map(What::Hits));
+                }
+                Effect::Curl => {
+                    let clump = by_clump(r.project, i).map(|k| What::Clump(i, k as u32));
+                    reads.extend(clump.filter(|w| !reads.contains(w)));
                 }
                 Effect::Wind if frame.is_some() => {
                     recipe = recipe.param("time", r.project.seconds(frame), "the frame's time");
@@ -198,6 +211,11 @@ pub(super) struct Hairs<'a> {
 }
 
 impl Reader<'_> {
+    /// True if a level of clumps acts in areas only.
+    fn in_areas(&self, i: usize, k: usize) -> bool {
+        !self.project.groom.value.layer[i].clump[k].areas.is_empty()
+    }
+
     fn clump(&self, i: usize, k: usize) -> Recipe {
         let layer = &self.project.groom.value.layer[i];
         let c = &layer.clump[k];
@@ -210,7 +228,10 @@ impl Reader<'_> {
         for (name, map) in [("area", &c.area), ("regions", &c.regions)] {
             r = r.with(map.iter().flat_map(|m| self.map_at(name, &format!("{at}.{name}"), m)));
         }
-        let by_hand = [("roots", c.roots.as_ref().map(|p| format!("{p:?}"))), ("curves", c.curves.as_ref().map(|p| format!("{p:?}")))];
+        let by_hand = [
+            ("roots", c.roots.as_ref().map(|p| format!("{p:?}"))),
+            ("curves", c.curves.as_ref().map(|p| format!("{p:?}"))),
+        ];
         for (name, value) in by_hand {
             r = value.into_iter().fold(r, |r, v| r.param(name, v, self.in_groom(&format!("{at}.{name}"))));
         }
@@ -246,8 +267,13 @@ impl Reader<'_> {
         let seed = layer_seed(&layer.name);
         let mut r = Recipe::new("", 0).param(&format!("{key}.seed"), seed, self.in_groom(&format!("layer[{i}].name")));
         let moment = self.project.moment(frame);
+        let areas = matches!(effect, Effect::Clump(k) if self.in_areas(i, k));
+        if frame.is_none() && (areas || effect == Effect::Wind) {
+            return Vec::new();
+        }
         for (_, v) in layer.varied().into_iter().filter(|(k, _)| *k == key) {
-            if matches!(v.name, "density" | "size") {
+            let made_before = matches!((effect, v.name), (Effect::Clump(_), "density" | "size"));
+            if made_before || (areas && matches!(v.name, "percent" | "rate")) {
                 continue;
             }
             let fields = self.value(&format!("{key}.{}", v.name), &format!("{at}.{}", v.name), v.value, moment);
@@ -263,12 +289,14 @@ impl Reader<'_> {
             r = r.param(&format!("{key}.{name}"), value, self.in_groom(&format!("{at}.{name}")));
         }
         match effect {
-            Effect::Clump(k) if !layer.clump[k].areas.is_empty() => {
-                let named = |e: &&crate::config::Emitter| layer.clump[k].areas.contains(&e.name);
-                for e in self.project.groom.value.emitter.iter().filter(named) {
-                    let value = format!("{:?} {:?} {:?}", e.radius, e.percent, e.clump_rate);
-                    let label = self.in_groom(&format!("emitter ({}) radius, percent, clump_rate", e.name));
-                    r = r.param(&format!("{key}.area.{}", e.name), value, label);
+            Effect::Clump(k) => {
+                let all = self.project.groom.value.emitter.iter().enumerate();
+                for (j, e) in all.filter(|(_, e)| layer.clump[k].areas.contains(&e.name)) {
+                    for (part, keys) in [("radius", &e.radius), ("percent", &e.percent), ("clump_rate", &e.clump_rate)]
+                    {
+                        let label = self.in_groom(&format!("emitter[{j}].{part}"));
+                        r = r.param(&format!("{key}.area.{}.{part}", e.name), keys, label);
+                    }
                 }
             }
             Effect::Wave(k) => {
@@ -281,72 +309,83 @@ impl Reader<'_> {
     }
 
     /// What else a part of the look says, by key.
-    fn settings_of(&self, i: usize, effect: Effect) -> Vec<(&'static str, String)> {
+    fn settings_of(&self, i: usize, effect: Effect) -> Vec<(String, String)> {
         let layer = &self.project.groom.value.layer[i];
+        let mut out: Vec<(String, String)> = Vec::new();
+        let mut add = |key: &str, value: &dyn Display| out.push((key.to_owned(), value.to_string()));
         match effect {
             Effect::Clump(k) => {
                 let c = &layer.clump[k];
-                let mut out = vec![("taper", c.taper.to_string()), ("keep_length", c.keep_length.to_string())];
-                out.extend(c.dilation.iter().map(|d| ("dilation", format!("{d:?}"))));
-                out.extend(c.wet.iter().map(|w| ("wet", format!("{w:?}"))));
-                out
+                add("taper", &c.taper);
+                add("keep_length", &c.keep_length);
+                if let Some(d) = &c.dilation {
+                    add("dilation.mean", &format!("{:?}", d.mean));
+                    add("dilation.deviation", &format!("{:?}", d.deviation));
+                    add("dilation.scale", &d.scale);
+                }
+                if let Some(w) = &c.wet {
+                    add("wet.width", &w.width);
+                    add("wet.opacity", &w.opacity);
+                }
             }
             Effect::Curl => {
                 let c = layer.curl.as_ref().expect("the layer has curls");
-                let mut out = vec![
-                    ("kind", format!("{:?}", c.kind)),
-                    ("start", c.start.to_string()),
-                    ("keep_length", c.keep_length.to_string()),
-                    ("per_clump", c.per_clump.to_string()),
-                ];
-                out.extend(c.depth.iter().map(|d| ("depth", d.to_string())));
-                out.extend(c.profile.iter().map(|p| ("profile", format!("{p:?}"))));
-                out.extend(c.x.iter().map(|w| ("x", format!("{w:?}"))));
-                out.extend(c.y.iter().map(|w| ("y", format!("{w:?}"))));
-                out
+                add("kind", &format!("{:?}", c.kind).to_lowercase());
+                add("start", &c.start);
+                add("keep_length", &c.keep_length);
+                add("per_clump", &c.per_clump);
+                c.depth.iter().for_each(|d| add("depth", d));
+                c.profile.iter().for_each(|p| add("profile", &format!("{p:?}")));
+                for (axis, w) in [("x", &c.x), ("y", &c.y)] {
+                    w.iter().flat_map(|w| w.values()).for_each(|(key, x)| add(&format!("{axis}.{key}"), &x));
+                }
             }
             Effect::Wave(k) => {
                 let w = &layer.wave[k];
-                vec![
-                    ("shape", format!("{:?}", w.shape)),
-                    ("x", format!("{:?}", w.x)),
-                    ("y", format!("{:?}", w.y)),
-                    ("size", w.size.to_string()),
-                    ("stray", w.stray.to_string()),
-                    ("keep_length", w.keep_length.to_string()),
-                ]
+                add("shape", &format!("{:?}", w.shape).to_lowercase());
+                for (axis, w) in [("x", &w.x), ("y", &w.y)] {
+                    w.settings().into_iter().for_each(|(key, x)| add(&format!("{axis}.{key}"), &x));
+                }
+                add("size", &w.size);
+                add("stray", &w.stray);
+                add("keep_length", &w.keep_length);
             }
             Effect::Noise(k) => {
                 let n = &layer.noise[k];
-                let mut out = vec![
-                    ("size", n.size.to_string()),
-                    ("across", n.across.to_string()),
-                    ("keep_length", n.keep_length.to_string()),
-                ];
-                out.extend(n.profile.iter().map(|p| ("profile", format!("{p:?}"))));
-                out
+                add("size", &n.size);
+                add("across", &n.across);
+                add("keep_length", &n.keep_length);
+                n.profile.iter().for_each(|p| add("profile", &format!("{p:?}")));
             }
             Effect::Wind => {
                 let w = layer.wind.as_ref().expect("the layer has wind");
-                vec![
-                    ("direction", format!("{:?}", w.direction)),
-                    ("frequency", w.frequency.to_string()),
-                    ("size", w.size.to_string()),
-                    ("gust", w.gust.to_string()),
-                ]
+                add("direction", &format!("{:?}", w.direction));
+                add("frequency", &w.frequency);
+                add("size", &w.size);
+                add("gust", &w.gust);
             }
         }
+        out
     }
 
     /// Particles of all emitters.
     fn hits(&self) -> Recipe {
         let shot = &self.project.shot.value.shot;
         let mut r = Recipe::new("interpolate/areas", version::AREAS).param("fps", shot.fps, self.in_shot("shot.fps"));
-        for (k, e) in self.project.groom.value.emitter.iter().enumerate() {
+        let emitters = self.project.groom.value.emitter.iter().enumerate();
+        for (k, e) in emitters.filter(|(k, _)| self.project.opens_areas(*k)) {
             let name = format!("emitter[{k}]");
-            let value = format!("{:?} {:?} {} {} {:?} {}", e.position, e.direction, e.spread, e.rate, e.frames, e.seed);
-            r = r.param(&name, value, self.in_groom(&name));
-            r = self.project.particles[k].iter().fold(r, |r, f| r.file(&format!("{name}.file"), &f.hash, f.label.clone()));
+            let mut values = vec![("spread", e.spread.to_string()), ("rate", e.rate.to_string())];
+            values.extend(e.position.iter().map(|p| ("position", p.to_string())));
+            values.extend(e.direction.iter().map(|d| ("direction", d.to_string())));
+            values.extend(e.frames.iter().map(|f| ("frames", format!("{f:?}"))));
+            values.push(("seed", e.seed.to_string()));
+            for (key, value) in values.into_iter().filter(|_| e.file.is_none()) {
+                r = r.param(&format!("{name}.{key}"), value, self.in_groom(&format!("{name}.{key}")));
+            }
+            r = self.project.particles[k]
+                .iter()
+                .fold(r, |r, f| r.file(&format!("{name}.file"), &f.hash, f.label.clone()));
         }
         r.param("first", shot.frames[0], self.in_shot("shot.frames (first)"))
     }
@@ -358,7 +397,9 @@ impl Step {
         let i = self.what.layer().expect("hairs are of a layer");
         let [simulated, after] = effects(project, i);
         match self.what {
-            What::Rest(_) if project.target(i) == Target::EveryHair => (simulated, finished_rest(project, i) == self.what),
+            What::Rest(_) if project.target(i) == Target::EveryHair => {
+                (simulated, finished_rest(project, i) == self.what)
+            }
             _ => (after, true),
         }
     }

@@ -395,8 +395,9 @@ impl<'a> Runner<'a> {
         let mut moments: BTreeMap<Option<i32>, Counts> = BTreeMap::new();
         for step in steps {
             let moment = match step.what {
-                What::Frame(_, f) => Some(f),
+                What::Frame(_, f) | What::Hits(f) => Some(f),
                 What::Simulate(_, k) => Some(k as i32),
+                // Hairs of the rest pose a second time.
                 What::Finished(_) => Some(i32::MIN),
                 _ => None,
             };
