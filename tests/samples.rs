@@ -88,14 +88,18 @@ fn seams_run_through_hair() {
     assert!(hairy >= 20, "{hairy} of {} seam edges have hair on both sides", seams.len());
 }
 
-/// The bust over two frames, the second well into the motion; nothing is simulated and nothing pushed out of the skin, so
+/// The bust over two frames, the second well into the motion; nothing is simulated, clumped or pushed out of the skin, so
 /// that lengths are exact.
 fn short_bust() -> ShotFolder {
     let shot = ShotFolder::new(COMMAND);
     sample::files(Sample::Bust).iter().for_each(|(name, bytes)| shot.write(name, bytes));
     shot.edit("pipeline.toml", "frames = [1001, 1048]", "frames = [1012, 1013]");
     shot.edit("pipeline.toml", "pivot =", "motion_start = 1001\npivot =");
-    shot.edit("pipeline.toml", "target = \"every-hair\"", "target = \"off\"\n\n[look]\ncollision = false");
+    shot.edit(
+        "pipeline.toml",
+        "target = \"every-hair\"",
+        "target = \"off\"\n\n[look]\nclump = false\ncollision = false",
+    );
     shot.edit("pipeline.toml", "frame = 1012", "frame = 1012\nsize = [320, 240]");
     shot.succeed(&["run", "--quiet"]);
     shot

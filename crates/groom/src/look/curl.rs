@@ -278,10 +278,12 @@ impl<'a> Own<'a> {
             self.displace(&s.along, &mut s.block);
             curled = s.block.length();
             let off = ((curled - total) / total).abs();
-            if !below(F::splat(CLOSE), off).any() {
+            let far = below(F::splat(CLOSE), off);
+            if !far.any() {
                 break;
             }
-            share = within_one(share * total / curled);
+            // Hairs that are near keep their share: what a hair gets does not depend on those beside it.
+            share = far.bitselect(within_one(share * total / curled), share);
         }
         let one = F::splat(1.0);
         s.along.arc = arc;

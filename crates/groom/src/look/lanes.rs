@@ -75,6 +75,13 @@ const WHOLE: f32 = 4e6;
 /// 1.5 times 2^23: what is added to it is rounded to a whole number, which its last bits then hold.
 const ROUND: f32 = 12_582_912.0;
 
+/// Whole part as the bits of an integer, and the fraction, within 0 and 1 also where x is too large to have one.
+#[inline(always)]
+fn cell(x: F) -> (U, F) {
+    let (whole, near) = floor(x);
+    (whole, (x - near).fast_max(F::splat(0.0)).fast_min(F::splat(1.0)))
+}
+
 /// Whole part, as the bits of an integer and as a number; nothing useful for what is not a number.
 #[inline(always)]
 fn floor(x: F) -> (U, F) {
@@ -92,7 +99,10 @@ fn floor(x: F) -> (U, F) {
 pub(crate) fn sin_cos_turn(x: F) -> (F, F) {
     // Quarter turn and what is left, within an eighth of a turn.
     let (q, quarter) = floor(x * F::splat(4.0) + F::splat(0.5));
-    let a = (x - quarter * F::splat(0.25)) * F::splat(std::f32::consts::TAU);
+    // Bounded for what is too large to have a fraction.
+    let eighth = F::splat(0.125);
+    let left = (x - quarter * F::splat(0.25)).fast_max(-eighth).fast_min(eighth);
+    let a = left * F::splat(std::f32::consts::TAU);
     let a2 = a * a;
     let c = |v: f32| F::splat(v);
     let s =
@@ -119,8 +129,7 @@ fn fade(t: F) -> F {
 /// [`super::perlin::perlin1`] with a key for every lane.
 #[inline(always)]
 pub(crate) fn perlin1(key: U, x: F) -> F {
-    let (i, whole) = floor(x);
-    let t = x - whole;
+    let (i, t) = cell(x);
     // A number from 1 to 2 of which the hash gives the fraction.
     let slope = |i: U| {
         let hash = mix(key ^ (i * U::splat(0x9e37_79b9)));
@@ -135,8 +144,8 @@ pub(crate) fn perlin1(key: U, x: F) -> F {
 #[inline(always)]
 pub(crate) fn perlin3(key: u32, p: V) -> [F; 2] {
     let one = F::splat(1.0);
-    let [(i, wx), (j, wy), (k, wz)] = [floor(p.0[0]), floor(p.0[1]), floor(p.0[2])];
-    let t = [p.0[0] - wx, p.0[1] - wy, p.0[2] - wz];
+    let [(i, u), (j, v), (k, w)] = [cell(p.0[0]), cell(p.0[1]), cell(p.0[2])];
+    let t = [u, v, w];
     let w = [fade(t[0]), fade(t[1]), fade(t[2])];
     // What the sides of the cell share is hashed once.
     let next = U::splat(1);
@@ -238,8 +247,12 @@ mod tests {
                 assert!(off < 2e-6, "{x}");
             }
         }
-        let (s, c) = sin_cos_turn(F::from([0.0, 1e30, f32::INFINITY, f32::NAN, 0.0, 0.0, 0.0, 0.0]));
+        let wild = F::from([0.0, 1e30, f32::INFINITY, f32::NAN, -1e9, 3e7, f32::MAX, -f32::INFINITY]);
+        let (s, c) = sin_cos_turn(wild);
         assert_eq!((s.to_array()[0], c.to_array()[0]), (0.0, 1.0));
+        let noise = [perlin1(U::splat(3), wild), perlin3(3, V([wild; 3]))[0]];
+        let bounded = |v: F| v.to_array().iter().enumerate().all(|(l, x)| l == 3 || x.abs() < 10.0);
+        assert!([s, c].into_iter().chain(noise).all(bounded), "{s:?} {c:?} {noise:?}");
     }
 
     #[test]

@@ -217,3 +217,24 @@ fn axes_turn_no_more_than_the_hair_from_frame_to_frame() {
         assert!(axis <= 1.25 * hair + 1e-6, "{axis} {hair}");
     }
 }
+
+#[test]
+fn a_hair_is_curled_alike_whatever_hairs_lie_beside_it() {
+    let (points, n) = (30, 40);
+    let position = hairs(n, points, 3.0);
+    let root = axes(points, &position);
+    let radius: Vec<f32> = (0..n).map(|h| if h % 3 == 0 { 2.0 } else { 0.3 }).collect();
+    let run = |position: &[[f32; 3]], axes: &[RootAxes], radius: &[f32], keep_length: bool| {
+        let mut out = position.to_vec();
+        let radius = Param { value: 0.5, factor: radius, shift: &[] };
+        curl(points, &Curl { keep_length, radius, ..settings(helix(), 1.0, 1.1, axes) }, &mut out);
+        out
+    };
+    for keep_length in [false, true] {
+        let together = run(&position, &root, &radius, keep_length);
+        for h in 0..n {
+            let alone = run(&position[h * points..][..points], &root[h..=h], &radius[h..=h], keep_length);
+            assert!(alone == together[h * points..][..points], "{h} {keep_length}");
+        }
+    }
+}
