@@ -3,6 +3,8 @@
 mod document;
 mod groom;
 mod look;
+mod look_check;
+mod look_value;
 mod shot;
 mod simulate;
 
@@ -13,9 +15,10 @@ pub use groom::{
 };
 pub use groom::{Side, Space, WidthFeature, WrapMode};
 pub use look::{
-    Clump, ClumpOf, Collision, Curl, CurlKind, CurlWave, Dilation, Emitter, Look, LookOverride, LookValue, Noise,
-    Operator, Varied, VariedValue, VaryScale, Wave, WaveAxis, WaveShape, WindLook,
+    Clump, ClumpOf, Collision, Curl, CurlKind, CurlWave, Dilation, Emitter, Look, LookOverride, Noise, Operator, Wave,
+    WaveAxis, WaveShape, WindLook,
 };
+pub use look_value::{LookValue, Varied, VariedValue, VaryScale};
 pub use shot::{CacheSettings, Export, ExportFormat, GroomRef, Preview, Shot, ShotFile, Skin, UpAxis};
 pub use simulate::{
     Amount, Key, Keyed, Material, SEGMENTS, Simulate, StrandModel, Target, Vector, WindSettings, check_material,

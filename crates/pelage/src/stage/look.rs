@@ -270,10 +270,12 @@ fn note_coarse_curls(run: &mut Runner<'_>, i: usize, acting: &[Effect], points: 
             0..=config::MOST_POINTS => format!("layer.points = {enough} draws them round"),
             _ => format!("{} points draw no turn as short as {pitch}", config::MOST_POINTS),
         };
-        run.warnings.push(format!(
-            "layer {}: a turn of its curls has {found:.1} segments on the longest hair: {help}",
-            layer.name
-        ));
+        let text =
+            format!("layer {}: a turn of its curls has {found:.1} segments on the longest hair: {help}", layer.name);
+        // At rest and for the frames it is the same.
+        if !run.warnings.contains(&text) {
+            run.warnings.push(text);
+        }
     }
     Ok(())
 }

@@ -112,9 +112,8 @@ pub fn by_clump(project: &Project, i: usize) -> Option<usize> {
 
 /// True if a level of clumps joins the clumps of the level before.
 pub fn joins_clumps(clump: &Clump, k: usize) -> bool {
-    let default = if k == 0 { ClumpOf::Hairs } else { ClumpOf::Clumps };
-    let by_hand = clump.roots.is_some() || clump.curves.is_some();
-    clump.of.unwrap_or(if by_hand { ClumpOf::Hairs } else { default }) == ClumpOf::Clumps
+    let default = if k == 0 || clump.density.is_none() { ClumpOf::Hairs } else { ClumpOf::Clumps };
+    clump.of.unwrap_or(default) == ClumpOf::Clumps
 }
 
 impl Plan {
