@@ -29,7 +29,7 @@ pub struct Clump<'a> {
     pub falloff: Param<'a>,
     /// How far tips leave the centre again, each at random between 0 and this, as a share of the way that they came.
     pub splay: Param<'a>,
-    /// Turns around the centre from root to tip, each hair at random between minus and plus this.
+    /// Turns around the centre from root to tip at percent 1, each hair at random between minus and plus this.
     pub weave: Param<'a>,
     /// Where along the hair it happens: l is replaced by l^(4^taper). Above 0 clumps stay wide until near the tip, below
     /// they are narrow from the root on.
@@ -99,7 +99,7 @@ pub fn clump(points: usize, c: &Clump, line: &[[f32; 3]], position: &mut [[f32; 
                 let rate = c.rate.of(h).clamp(0.0, 1.0);
                 delta.iter_mut().zip(&profile).for_each(|(x, [a, b])| *x = percent * (a + rate * b));
             }
-            let open = c.splay.of(h);
+            let open = c.splay.of(h).clamp(0.0, 1.0);
             if open != 0.0 {
                 let open = open * uniform(c.seed, c.id[h], channel("clump splay"), 0) as f32;
                 delta.iter_mut().zip(&splay).for_each(|(x, s)| *x *= 1.0 - open * s);
@@ -108,7 +108,7 @@ pub fn clump(points: usize, c: &Clump, line: &[[f32; 3]], position: &mut [[f32; 
             draw(hair, line, &delta);
             let weave = c.weave.of(h);
             if weave != 0.0 {
-                let turns = weave * (2.0 * uniform(c.seed, c.id[h], channel("clump weave"), 0) - 1.0) as f32;
+                let turns = percent * weave * (2.0 * uniform(c.seed, c.id[h], channel("clump weave"), 0) - 1.0) as f32;
                 wind_around(hair, line, turns);
             }
             if c.keep_length {

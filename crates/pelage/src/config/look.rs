@@ -38,8 +38,8 @@ pub struct Clump {
     /// their roots.
     #[serde(default, deserialize_with = "some_lines")]
     pub curves: Option<Lines>,
-    /// Radius of a clump, scene units (for regions: the longest step between hairs of one region). Default: so large that
-    /// every hair is in a clump.
+    /// Radius of a clump, scene units (for regions: the longest step between hairs of one region). Default: four times the
+    /// distance between clumps of that density; a centimetre for clumps placed by hand.
     pub size: Option<LookValue>,
     /// Map that limits clumps to where it is at least 0.5.
     pub area: Option<MapRef>,
@@ -57,7 +57,7 @@ pub struct Clump {
     /// How far tips open again, each at random up to this share, 0 to 1. Default: 0.
     #[serde(default = "zero")]
     pub splay: LookValue,
-    /// Turns of hairs around the centre from root to tip, each at random up to this. Default: 0.
+    /// Turns of hairs around the centre from root to tip at percent 1, each at random up to this. Default: 0.
     #[serde(default = "zero")]
     pub weave: LookValue,
     /// Above 0, clumps stay wide until near the tip; below, they are narrow from the root on; -1 to 1. Default: 0.
@@ -68,7 +68,8 @@ pub struct Clump {
     /// Keep the lengths of hairs instead of bringing their points exactly where the formula says. Default: false.
     #[serde(default)]
     pub keep_length: bool,
-    /// Names of emitters: the clumps act only in the areas that their particles open, as those say.
+    /// Names of emitters: the clumps act only in the areas that their particles open; percent and rate are then those of the
+    /// emitters, and the clump's own are not read.
     #[serde(default)]
     pub areas: Vec<String>,
     /// Factors on width and opacity of hairs of percent 1.
@@ -434,6 +435,17 @@ pub enum Operator {
 }
 
 impl Operator {
+    /// Name as written in a file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Operator::Clump => "clump",
+            Operator::Curl => "curl",
+            Operator::Wave => "wave",
+            Operator::Noise => "noise",
+            Operator::Wind => "wind",
+        }
+    }
+
     /// The order in which they act if a layer does not say otherwise.
     pub const ALL: [Operator; 5] = [Operator::Clump, Operator::Curl, Operator::Wave, Operator::Noise, Operator::Wind];
 }
@@ -610,6 +622,11 @@ impl Layer {
     /// Operators in the order in which they act.
     pub fn order(&self) -> Vec<Operator> {
         self.order.clone().unwrap_or(Operator::ALL.to_vec())
+    }
+
+    /// True if the layer has parts of an operator.
+    pub fn has(&self, operator: Operator) -> bool {
+        !self.simulated(operator).is_empty()
     }
 
     /// True for each part of an operator that is handed to the simulation.

@@ -27,7 +27,7 @@ impl Document<GroomFile> {
                     self.within(&format!("{at}.{axis}.{key}"), x, -1e6, 1e6)?;
                 }
             }
-            self.within(&format!("{at}.size"), w.size, 0.0, 1e6)?;
+            self.within(&format!("{at}.size"), if w.size == 0.0 { 1.0 } else { w.size }, 1e-9, 1e6)?;
             self.within(&format!("{at}.stray"), w.stray, 0.0, 1.0)?;
         }
         for (k, n) in l.noise.iter().enumerate() {
@@ -146,7 +146,7 @@ impl Document<GroomFile> {
                 return Err(self.error(at, format!("this kind of curl needs `{name}`"), "in scene units"));
             }
         }
-        if c.pitch.iter().flat_map(|p| &p.0.value.0).any(|k| k.value <= 0.0) {
+        if c.pitch.iter().flat_map(|p| &p.0.value.0).any(|k| k.value < 1e-12) {
             return Err(self.error(&format!("{at}.pitch"), "must be above 0", "it is the length of a turn"));
         }
         for (name, has) in [("x", c.x.is_some()), ("y", c.y.is_some())] {

@@ -89,7 +89,7 @@ fn find(run: &mut Runner<'_>, i: usize, k: usize, what: What) -> Result<Members,
         LookValue::constant(match (spacing, &c.regions) {
             (Some(s), _) => 4.0 * s,
             (None, Some(_)) => 2.0 / (hair_density.max(1e-9) * cm2).sqrt(),
-            (None, None) => 1.0,
+            (None, None) => 1.0 / cm2.sqrt(),
         })
     });
     let factor = varied(run, &hairs, "size", &size)?;

@@ -265,7 +265,7 @@ fn note_coarse_curls(run: &mut Runner<'_>, i: usize, acting: &[Effect], points: 
     let turns = f64::from(longest) / pitch;
     let found = (points - 1) as f64 / turns;
     if turns > 0.0 && found < SMOOTH {
-        let enough = (turns * 2.0 * SMOOTH).ceil() as usize + 1;
+        let enough = ((turns * 2.0 * SMOOTH).ceil() as usize).saturating_add(1);
         let help = match enough {
             0..=config::MOST_POINTS => format!("layer.points = {enough} draws them round"),
             _ => format!("{} points draw no turn as short as {pitch}", config::MOST_POINTS),

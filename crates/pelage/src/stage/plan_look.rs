@@ -167,8 +167,17 @@ impl Plan {
                 _ => {}
             }
         }
+        let layer = &r.project.groom.value.layer[i];
         if !effects.is_empty() {
-            recipe = recipe.param("look", version::LOOK, "the look");
+            let order = r.in_groom(&format!("layer[{i}].order"));
+            recipe =
+                recipe.param("look", version::LOOK, "the look").param("order", format!("{:?}", layer.order()), order);
+        }
+        // What a shot switches off is told by its own key too; what is simulated reads only the parts that are.
+        let simulated = matches!(what, What::Rest(_)) && r.project.target(i) == Target::EveryHair;
+        for operator in Operator::ALL.into_iter().filter(|o| !simulated && layer.has(*o)) {
+            let (name, on) = (format!("look.{}", operator.name()), r.project.shot.value.look.has(operator));
+            recipe = recipe.param(&name, on, r.in_shot(&name));
         }
         let collides = last && collides(r.project, i);
         if collides {
