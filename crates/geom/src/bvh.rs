@@ -143,28 +143,47 @@ impl Bvh {
 
     /// Closest point; `None` for an empty mesh or if nothing is nearer than `limit`. Ties go to the lowest triangle.
     pub fn closest(&self, query: Vec3, limit: f64) -> Option<Closest> {
+        // Max and min pass over NaN, so that it would come near everything.
+        if query.iter().chain([&limit]).any(|x| x.is_nan()) {
+            return None;
+        }
         let mut best: Option<(usize, Hit)> = None;
-        let mut reach = limit * limit;
+        self.descend(
+            limit * limit,
+            |n| n.square_distance(&query),
+            |slot, reach| {
+                let hit = closest_on_triangle(&query, corners(&self.position, self.triangle[slot]));
+                let better = hit.square < reach
+                    || (hit.square == reach && best.as_ref().is_some_and(|(b, _)| self.rank(slot) < self.rank(*b)));
+                if !better {
+                    return reach;
+                }
+                let square = hit.square;
+                best = Some((slot, hit));
+                square
+            },
+        );
+        best.map(|(slot, hit)| self.signed(query, slot, &hit))
+    }
+
+    /// Visits the triangles of all leaves within `reach` by the `distance` of their boxes, near ones first. A visit takes a
+    /// triangle's slot and the reach, and says what the reach is from there on.
+    #[inline(always)]
+    fn descend(&self, mut reach: f64, distance: impl Fn(&Node) -> f64, mut visit: impl FnMut(usize, f64) -> f64) {
         let mut stack = [Waiting::default(); STACK];
         let mut depth = 0;
-        let mut node = self.root?.waiting(|n| n.square_distance(&query));
-        // Max and min pass over NaN, so that it would come near everything.
-        if node.far > reach || query.iter().chain([&limit]).any(|x| x.is_nan()) {
-            return None;
+        let Some(root) = &self.root else { return };
+        let mut node = root.waiting(&distance);
+        if node.far > reach {
+            return;
         }
         loop {
             if node.count > 0 {
                 for slot in node.start as usize..(node.start + node.count) as usize {
-                    let hit = closest_on_triangle(&query, corners(&self.position, self.triangle[slot]));
-                    let better = hit.square < reach
-                        || (hit.square == reach && best.is_some_and(|(b, _)| self.rank(slot) < self.rank(b)));
-                    if better {
-                        reach = hit.square;
-                        best = Some((slot, hit));
-                    }
+                    reach = visit(slot, reach);
                 }
             } else {
-                let (near, next) = self.pair[node.start as usize].order(|n| n.square_distance(&query));
+                let (near, next) = self.pair[node.start as usize].order(&distance);
                 if near.far <= reach {
                     if next.far <= reach {
                         stack[depth] = next;
@@ -176,7 +195,7 @@ impl Bvh {
             }
             loop {
                 if depth == 0 {
-                    return best.map(|(slot, hit)| self.signed(query, slot, &hit));
+                    return;
                 }
                 depth -= 1;
                 if stack[depth].far <= reach {

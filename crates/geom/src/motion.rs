@@ -25,16 +25,28 @@ pub struct RigidTransform {
     pub pivot: [f64; 3],
 }
 
+/// Places of the keys around `time` and the fraction of the way from the first to the second, for keys that ascend in
+/// time: linear in between, held beyond the ends. Of keys at one time the last counts from there on. `None` without keys.
+pub fn between<T>(keys: &[T], time_of: impl Fn(&T) -> f64, time: f64) -> Option<(usize, usize, f64)> {
+    let last = keys.len().checked_sub(1)?;
+    let next = keys.partition_point(|k| time_of(k) <= time);
+    let (a, b) = (next.saturating_sub(1), next.min(last));
+    let span = time_of(&keys[b]) - time_of(&keys[a]);
+    let f = if span > 0.0 { ((time - time_of(&keys[a])) / span).clamp(0.0, 1.0) } else { 0.0 };
+    Some((a, b, f))
+}
+
+/// A rotation from (x, y, z, w) of length 1.
+pub(crate) fn rotation([x, y, z, w]: [f64; 4]) -> UnitQuaternion<f64> {
+    UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z))
+}
+
 impl RigidMotion {
     /// The transform at `time` seconds about `pivot`; the identity without samples.
     pub fn at(&self, time: f64, pivot: [f64; 3]) -> RigidTransform {
-        let Some(last) = self.time.len().checked_sub(1) else {
+        let Some((prev, next, f)) = between(&self.time, |t| *t, time) else {
             return RigidTransform { rotation: [0.0, 0.0, 0.0, 1.0], translation: [0.0; 3], pivot };
         };
-        let next = self.time.partition_point(|&t| t <= time).min(last);
-        let prev = if time >= self.time[last] { last } else { next.saturating_sub(1) };
-        let span = self.time[next] - self.time[prev];
-        let f = if span > 0.0 { ((time - self.time[prev]) / span).clamp(0.0, 1.0) } else { 0.0 };
         let (a, b) = (self.translation[prev], self.translation[next]);
         RigidTransform {
             rotation: slerp(self.rotation[prev], self.rotation[next], f),
@@ -63,18 +75,19 @@ fn slerp(a: [f64; 4], b: [f64; 4], f: f64) -> [f64; 4] {
 impl RigidTransform {
     /// Moves a rest-pose position.
     pub fn apply(&self, rest: Vec3) -> Vec3 {
-        let [x, y, z, w] = self.rotation;
-        let q = UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z));
         let pivot = Vec3::from(self.pivot);
-        q * (rest - pivot) + pivot + Vec3::from(self.translation)
+        rotation(self.rotation) * (rest - pivot) + pivot + Vec3::from(self.translation)
     }
 
     /// Takes a moved position back to the rest pose.
     pub fn invert(&self, moved: Vec3) -> Vec3 {
-        let [x, y, z, w] = self.rotation;
-        let q = UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z));
         let pivot = Vec3::from(self.pivot);
-        q.conjugate() * (moved - pivot - Vec3::from(self.translation)) + pivot
+        self.invert_direction(moved - pivot - Vec3::from(self.translation)) + pivot
+    }
+
+    /// Takes a direction of the moved pose back to the rest pose.
+    pub fn invert_direction(&self, moved: Vec3) -> Vec3 {
+        rotation(self.rotation).conjugate() * moved
     }
 }
 

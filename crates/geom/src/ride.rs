@@ -1,6 +1,6 @@
 //! How points of a skin have moved since rest, and how a skin comes from its rest pose into a motion.
 
-use crate::motion::RigidTransform;
+use crate::motion::{RigidTransform, rotation};
 use crate::{Mesh, Offsets, Pose, SurfacePoint, Topology, Vec3};
 use nalgebra::{Quaternion, UnitQuaternion};
 use rayon::prelude::*;
@@ -46,8 +46,7 @@ pub fn rides(
 pub fn carry(offsets: &Offsets, origin: [f64; 3], anchor: &[[f64; 3]], rides: &[Ride], points: &mut [[f32; 3]]) {
     let origin = Vec3::from(origin);
     for (h, (anchor, ride)) in anchor.iter().zip(rides).enumerate() {
-        let [x, y, z, w] = ride.rotation;
-        let turn = UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z));
+        let turn = rotation(ride.rotation);
         for p in &mut points[offsets.range(h)] {
             let from_root = Vec3::from(p.map(f64::from)) + origin - Vec3::from(*anchor);
             let q = turn * from_root + Vec3::from(ride.position) - origin;
@@ -96,11 +95,7 @@ pub fn ease_positions(rest: &[[f64; 3]], target: &[[f64; 3]], next: &[[f64; 3]],
 pub fn ease_rigid(target: &RigidTransform, next: &RigidTransform, step: f64, frames: f64, s: f64) -> RigidTransform {
     let [pose, velocity] = ease(s);
     let velocity = velocity * frames / step;
-    let quaternion = |t: &RigidTransform| {
-        let [x, y, z, w] = t.rotation;
-        UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z))
-    };
-    let (to, then) = (quaternion(target), quaternion(next));
+    let (to, then) = (rotation(target.rotation), rotation(next.rotation));
     let q = power(then * to.inverse(), velocity) * power(to, pose);
     let translation = std::array::from_fn(|x| {
         target.translation[x] * pose + (next.translation[x] - target.translation[x]) * velocity

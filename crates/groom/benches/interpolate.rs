@@ -5,14 +5,15 @@
 // A benchmark has to read the clock, which the crate itself must not.
 #![allow(clippy::disallowed_methods)]
 
-use pelage_geom::{Vec3, rng};
-use pelage_groom::interpolate::{Blend, ControlPose, interpolate};
+mod common;
+
+use common::{CONTROLS, controls, u};
+use pelage_groom::interpolate::{Blend, interpolate};
 use rayon::prelude::*;
 use std::hint::black_box;
 use std::time::Instant;
 
 const HAIRS: usize = 1_000_000;
-const CONTROLS: usize = 1_000;
 const RUNS: usize = 15;
 
 fn main() {
@@ -24,16 +25,7 @@ fn main() {
 
 /// Times one case. `scattered` gives every hair three arbitrary control hairs instead of those of its neighbours.
 fn measure(points: usize, scattered: bool) {
-    let u = |id: usize, k: u64| rng::uniform(1, id as u64, 2, k);
-    let mut lines = Vec::with_capacity(CONTROLS * points);
-    for h in 0..CONTROLS {
-        let mut p = Vec3::zeros();
-        for s in 0..points as u64 {
-            lines.push(p);
-            p += Vec3::new(u(h, 3 * s) - 0.5, 1.0, u(h, 3 * s + 1) - 0.5);
-        }
-    }
-    let controls = ControlPose::from_polylines(&lines, points, points);
+    let controls = controls(points);
     let control = |i: usize, k: u64| {
         let near = i * CONTROLS / HAIRS;
         let any = (u(i, k) * CONTROLS as f64) as usize;

@@ -5,9 +5,12 @@
 // A benchmark has to read the clock, which the crate itself must not.
 #![allow(clippy::disallowed_methods)]
 
+mod common;
+
+use common::{CONTROLS, controls, u};
 use pelage_geom::shapes::cube_sphere;
-use pelage_geom::{Pose, SurfacePoint, Topology, Vec3, rng};
-use pelage_groom::interpolate::{Blend, ControlPose, interpolate};
+use pelage_geom::{Pose, SurfacePoint, Topology, Vec3};
+use pelage_groom::interpolate::{Blend, interpolate};
 use pelage_groom::look::Param;
 use pelage_groom::look::axes::{carried, rest_axes};
 use pelage_groom::look::clump::{Clump, centre_lines, clump};
@@ -20,7 +23,6 @@ use pelage_groom::look::wind::{Wind, wind};
 use std::hint::black_box;
 use std::time::Instant;
 
-const CONTROLS: usize = 1_000;
 const RUNS: usize = 5;
 
 fn main() {
@@ -32,7 +34,6 @@ fn main() {
 }
 
 fn measure(hairs: usize, points: usize) {
-    let u = |id: usize, k: u64| rng::uniform(1, id as u64, 2, k);
     let mesh = cube_sphere(40, 10.0);
     let topology = Topology::new(&mesh);
     let pose = Pose::new(&mesh, &topology, mesh.position.clone());
@@ -48,15 +49,7 @@ fn measure(hairs: usize, points: usize) {
     let single = |v: Vec3| [v.x as f32, v.y as f32, v.z as f32];
     let root: Vec<[f32; 3]> = surface.iter().map(|p| single(frame(p).origin)).collect();
     let normal: Vec<[f32; 3]> = surface.iter().map(|p| single(frame(p).n)).collect();
-    let mut lines = Vec::with_capacity(CONTROLS * points);
-    for h in 0..CONTROLS {
-        let mut p = Vec3::zeros();
-        for s in 0..points as u64 {
-            lines.push(p);
-            p += Vec3::new(u(h, 3 * s) - 0.5, 1.0, u(h, 3 * s + 1) - 0.5);
-        }
-    }
-    let controls = ControlPose::from_polylines(&lines, points, points);
+    let controls = controls(points);
     let near = |i: usize, k: u64| ((i * CONTROLS / hairs + (u(i, k) * 40.0) as usize) % CONTROLS) as u32;
     let hair: Vec<[u32; 3]> = (0..hairs).map(|i| [near(i, 7), near(i, 8), near(i, 9)]).collect();
     let weight = vec![[0.5, 0.3, 0.2]; hairs];

@@ -5,47 +5,20 @@
 //! a ball around its centre in the space of the rest skin: charts, seams and T-junctions mean nothing to it, and it moves
 //! with the skin, as the hairs do.
 
-use pelage_geom::motion::RigidTransform;
+use pelage_geom::motion::{RigidTransform, between};
 use pelage_geom::{Bvh, SurfacePoint, Vec3, rng};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// The values of the keys around `time`, and how far it is from the first to the second, in [0, 1].
-fn around<T: Copy>(keys: &[(f64, T)], time: f64) -> Option<(T, T, f64)> {
-    let next = keys.partition_point(|k| k.0 <= time);
-    let (Some(&after), Some(&before)) = (keys.get(next), keys.get(next.wrapping_sub(1))) else {
-        let held = if next == 0 { keys.first() } else { keys.last() }?.1;
-        return Some((held, held, 0.0));
-    };
-    Some((before.1, after.1, (time - before.0) / (after.0 - before.0)))
-}
-
-/// The value at `time` of keys (time, value), ascending in time: linear in between, held beyond the ends. Of two keys at one
-/// time the later counts from there on. `None` without keys.
+/// The value at `time` of keys (time, value), ascending in time: see [`between`].
 pub fn keyed(keys: &[(f64, f64)], time: f64) -> Option<f64> {
-    around(keys, time).map(|(a, b, f)| a + (b - a) * f)
-}
-
-/// Keys of a journey along a polyline at constant speed, from its first point at frame `from` to its last at frame `to`.
-pub fn journey(path: &[[f64; 3]], from: f64, to: f64) -> Vec<(f64, [f64; 3])> {
-    let mut way = 0.0;
-    let mut last = path.first().copied().unwrap_or_default();
-    let passed: Vec<f64> = path
-        .iter()
-        .map(|&p| {
-            way += (Vec3::from(p) - Vec3::from(last)).norm();
-            last = p;
-            way
-        })
-        .collect();
-    let part = |s: f64| if way > 0.0 { s / way } else { 0.0 };
-    path.iter().zip(&passed).map(|(&p, &s)| (from + (to - from) * part(s), p)).collect()
+    between(keys, |k| k.0, time).map(|(a, b, f)| keys[a].1 + (keys[b].1 - keys[a].1) * f)
 }
 
 /// A spout of particles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Emitter {
-    /// Where it is, scene units, by frame; one key stands still, [`journey`] travels.
+    /// Where it is, scene units, by frame; one key stands still.
     pub position: Vec<(f64, [f64; 3])>,
     /// Where it points, scene space; need not be unit.
     pub direction: [f64; 3],
@@ -91,14 +64,24 @@ impl Emitter {
         k
     }
 
-    /// Particles that leave from the start of `frames.start` to the start of `frames.end`. Particle k leaves k / rate
-    /// seconds after the first and is a function of the emitter and k alone: however frames are split, the particles are
-    /// the same. None without a position, a rate or a direction that can be followed.
-    pub fn particles(&self, frames: Range<i32>, fps: f64) -> Vec<Particle> {
+    /// Numbers of the particles that leave from the start of `frames.start` to the start of `frames.end`. None without a
+    /// position, a rate or a direction that can be followed.
+    pub fn numbers(&self, frames: Range<i32>, fps: f64) -> Range<u64> {
         let on = frames.start.max(self.frames[0])..frames.end.min(self.frames[1].saturating_add(1));
-        let axis = Vec3::from(self.direction).try_normalize(0.0).filter(|a| a.iter().all(|x| x.is_finite()));
         let pace = self.rate / fps;
-        let (Some(axis), true) = (axis, pace > 0.0 && pace.is_finite() && !on.is_empty()) else { return Vec::new() };
+        let flows = pace > 0.0 && pace.is_finite() && self.axis().is_some() && !self.position.is_empty();
+        if on.is_empty() || !flows { 0..0 } else { self.first_from(on.start, fps)..self.first_from(on.end, fps) }
+    }
+
+    /// Unit direction, if there is one.
+    fn axis(&self) -> Option<Vec3> {
+        Vec3::from(self.direction).try_normalize(0.0).filter(|a| a.iter().all(|x| x.is_finite()))
+    }
+
+    /// Particles with those [numbers](Self::numbers). Particle k leaves k / rate seconds after the first and is a function
+    /// of the emitter and k alone: however frames are split, the particles are the same.
+    pub fn particles(&self, frames: Range<i32>, fps: f64) -> Vec<Particle> {
+        let Some(axis) = self.axis() else { return Vec::new() };
         let (side, up) = across(axis);
         let narrow = 1.0 - libm::cos(self.spread.clamp(0.0, 180.0).to_radians());
         let particle = |number: u64| {
@@ -109,11 +92,12 @@ impl Emitter {
             let turn = std::f64::consts::TAU * random("particle turn");
             let direction = axis * along + side * (out * libm::cos(turn)) + up * (out * libm::sin(turn));
             let time = self.time(number, fps);
-            let (from, to, f) = around(&self.position, time)?;
+            let (from, to, f) = between(&self.position, |k| k.0, time)?;
+            let (from, to) = (self.position[from].1, self.position[to].1);
             let origin = std::array::from_fn(|i| from[i] + (to[i] - from[i]) * f);
             Some(Particle { number, time, origin, direction: direction.into() })
         };
-        (self.first_from(on.start, fps)..self.first_from(on.end, fps)).filter_map(particle).collect()
+        self.numbers(frames, fps).filter_map(particle).collect()
     }
 }
 
@@ -142,21 +126,13 @@ pub fn hits(particles: &[Particle], bvh: &Bvh, placement: Option<&RigidTransform
     let hit = |p: &Particle| {
         let (origin, direction) = (Vec3::from(p.origin), Vec3::from(p.direction));
         let (origin, direction) = match placement {
-            Some(t) => into_rest(t, origin, direction),
+            Some(t) => (t.invert(origin), t.invert_direction(direction)),
             None => (origin, direction),
         };
         let (_, point) = bvh.ray(origin, direction, f64::INFINITY)?;
         Some(Hit { number: p.number, time: p.time, point })
     };
     particles.par_iter().filter_map(hit).collect()
-}
-
-/// A ray of scene space as the rest pose sees it.
-fn into_rest(t: &RigidTransform, origin: Vec3, direction: Vec3) -> (Vec3, Vec3) {
-    let [x, y, z, w] = t.rotation;
-    let back = RigidTransform { rotation: [-x, -y, -z, w], translation: [0.0; 3], pivot: [0.0; 3] };
-    let pivot = Vec3::from(t.pivot);
-    (back.apply(origin - Vec3::from(t.translation) - pivot) + pivot, back.apply(direction))
 }
 
 /// How an area lives: curves over its age, the frames since its particle hit.

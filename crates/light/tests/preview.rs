@@ -22,19 +22,22 @@ impl Hairs {
         self.opacity.push(opacity);
     }
 
-    /// Renders 160 x 130 pixels of a 160 x 130 unit window at the origin, seen along -z.
-    fn render(&self, skin: Option<SkinView>, lights: &[Light], background: [f32; 3], settings: &Settings) -> Image {
-        let offsets = Offsets::from_counts(self.counts.iter().copied());
-        let layer = HairView {
-            offsets: &offsets,
+    fn view<'a>(&'a self, offsets: &'a Offsets) -> HairView<'a> {
+        HairView {
+            offsets,
             position: &self.position,
             origin: [0.0; 3],
             width: &self.width,
             color: &self.color,
             opacity: &self.opacity,
             root_normal: &[],
-        };
-        let layers = [layer];
+        }
+    }
+
+    /// Renders 160 x 130 pixels of a 160 x 130 unit window at the origin, seen along -z.
+    fn render(&self, skin: Option<SkinView>, lights: &[Light], background: [f32; 3], settings: &Settings) -> Image {
+        let offsets = Offsets::from_counts(self.counts.iter().copied());
+        let layers = [self.view(&offsets)];
         let scene = Scene { skin, layers: &layers, lights, background };
         render(&scene, &flat_camera(), 160, 130, settings).0
     }
@@ -189,15 +192,7 @@ fn the_same_bytes_for_any_number_of_threads() {
 fn a_region_has_the_pixels_of_the_whole_picture() {
     let hairs = tuft(1500);
     let offsets = Offsets::from_counts(hairs.counts.iter().copied());
-    let layer = HairView {
-        offsets: &offsets,
-        position: &hairs.position,
-        origin: [0.0; 3],
-        width: &hairs.width,
-        color: &hairs.color,
-        opacity: &hairs.opacity,
-        root_normal: &[],
-    };
+    let layer = hairs.view(&offsets);
     let (position, triangle) = square(35.0, 0.0);
     let skin = SkinView { position: &position, triangle: &triangle, normal: &[], color: [0.6, 0.5, 0.4] };
     for camera in [flat_camera(), Camera { parallel_height: None, fov_y_deg: 50.0, ..flat_camera() }] {

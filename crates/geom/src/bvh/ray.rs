@@ -1,6 +1,6 @@
 //! Where a ray meets the mesh.
 
-use super::{Bvh, STACK, Waiting, surface_point};
+use super::{Bvh, surface_point};
 use crate::mesh::corners;
 use crate::{SurfacePoint, Vec3};
 
@@ -16,46 +16,25 @@ impl Bvh {
     pub(super) fn first_hit(&self, origin: Vec3, direction: Vec3, max_t: f64) -> Option<(f64, usize, [f64; 2])> {
         let shear = Shear::new(origin, direction)?;
         let inverse = direction.map(|d| 1.0 / d);
-        let mut best: Option<(usize, [f64; 2])> = None;
-        // Finite, so that a box that is missed (infinite) is never within reach.
-        let mut reach = max_t.min(f64::MAX);
-        let mut stack = [Waiting::default(); STACK];
-        let mut depth = 0;
-        let mut node = self.root?.waiting(|n| n.enter(&origin, &inverse));
-        if node.far > reach || origin.iter().chain(&direction).chain([&max_t]).any(|x| x.is_nan()) {
+        if origin.iter().chain(&direction).chain([&max_t]).any(|x| x.is_nan()) {
             return None;
         }
-        loop {
-            if node.count > 0 {
-                for slot in node.start as usize..(node.start + node.count) as usize {
-                    let Some((t, weight)) = shear.hit(corners(&self.position, self.triangle[slot])) else { continue };
-                    if t < reach || (t == reach && best.is_some_and(|(b, _)| self.index[slot] < self.index[b])) {
-                        reach = t;
-                        best = Some((slot, weight));
-                    }
+        let mut best: Option<(f64, usize, [f64; 2])> = None;
+        // Finite, so that a box that is missed (infinite) is never within reach.
+        self.descend(
+            max_t.min(f64::MAX),
+            |n| n.enter(&origin, &inverse),
+            |slot, reach| match shear.hit(corners(&self.position, self.triangle[slot])) {
+                Some((t, weight))
+                    if t < reach || (t == reach && best.is_some_and(|b| self.index[slot] < self.index[b.1])) =>
+                {
+                    best = Some((t, slot, weight));
+                    t
                 }
-            } else {
-                let (near, next) = self.pair[node.start as usize].order(|n| n.enter(&origin, &inverse));
-                if near.far <= reach {
-                    if next.far <= reach {
-                        stack[depth] = next;
-                        depth += 1;
-                    }
-                    node = near;
-                    continue;
-                }
-            }
-            loop {
-                if depth == 0 {
-                    return best.map(|(slot, weight)| (reach, slot, weight));
-                }
-                depth -= 1;
-                if stack[depth].far <= reach {
-                    node = stack[depth];
-                    break;
-                }
-            }
-        }
+                _ => reach,
+            },
+        );
+        best
     }
 }
 

@@ -7,6 +7,7 @@
 //! (and stays the straight line at rate 0). `delta` stays within 0 and 1, grows along the hair at every rate, and is
 //! smooth.
 
+use super::axes::{Along, RootAxes};
 use super::{CHUNK, Param, V3, at_station, lengths, relay, station_weights};
 use pelage_geom::rng::{channel, uniform};
 use pelage_geom::{NONE, StrandId};
@@ -148,20 +149,10 @@ pub fn drawn_lines(
     points: usize,
     position: &[[f32; 3]],
     carrier: &[u32],
-    axes: &[super::axes::RootAxes],
+    axes: &[RootAxes],
     drawn: &[[f32; 3]],
 ) -> Vec<[f32; 3]> {
-    let mut along = super::axes::Along::default();
-    let mut out = Vec::with_capacity(drawn.len());
-    for (&h, drawn) in carrier.iter().zip(drawn.chunks_exact(points)) {
-        let hair = &position[h as usize * points..][..points];
-        along.set(hair, &axes[h as usize]);
-        for (k, d) in drawn.iter().enumerate() {
-            let (t, x) = (along.tangent[k], along.normal[k]);
-            out.push((V3::from(hair[k]) + t * d[0] + x * d[1] + t.cross(&x) * d[2]).into());
-        }
-    }
-    out
+    in_carriers(points, position, carrier, axes, drawn, |p, [t, x, y], d| p + t * d[0] + x * d[1] + y * d[2])
 }
 
 /// Says lines at rest (C times P points) in the axes of their carriers at rest.
@@ -169,18 +160,32 @@ pub fn bind_lines(
     points: usize,
     position: &[[f32; 3]],
     carrier: &[u32],
-    axes: &[super::axes::RootAxes],
+    axes: &[RootAxes],
     line: &[[f32; 3]],
 ) -> Vec<[f32; 3]> {
-    let mut along = super::axes::Along::default();
+    in_carriers(points, position, carrier, axes, line, |p, axes, q| {
+        let from = V3::from(q) - p;
+        V3::from(axes.map(|a| a.dot(&from)))
+    })
+}
+
+/// Points of lines, each by the point of its carrier beside it and the axes there (tangent, x, y).
+fn in_carriers(
+    points: usize,
+    position: &[[f32; 3]],
+    carrier: &[u32],
+    axes: &[RootAxes],
+    line: &[[f32; 3]],
+    point: impl Fn(V3, [V3; 3], [f32; 3]) -> V3,
+) -> Vec<[f32; 3]> {
+    let mut along = Along::default();
     let mut out = Vec::with_capacity(line.len());
     for (&h, line) in carrier.iter().zip(line.chunks_exact(points)) {
         let hair = &position[h as usize * points..][..points];
         along.set(hair, &axes[h as usize]);
-        for (k, p) in line.iter().enumerate() {
+        for (k, q) in line.iter().enumerate() {
             let (t, x) = (along.tangent[k], along.normal[k]);
-            let o = V3::from(*p) - V3::from(hair[k]);
-            out.push([t.dot(&o), x.dot(&o), t.cross(&x).dot(&o)]);
+            out.push(point(V3::from(hair[k]), [t, x, t.cross(&x)], *q).into());
         }
     }
     out

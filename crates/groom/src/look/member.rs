@@ -34,19 +34,30 @@ pub struct Members {
     pub reach: Vec<f32>,
 }
 
+/// Squared distance of two points.
+#[inline(always)]
+fn square(p: [f32; 3], q: [f32; 3]) -> f32 {
+    let d: [f32; 3] = std::array::from_fn(|x| p[x] - q[x]);
+    d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
+}
+
 impl Sites<'_> {
+    /// Squared distance of two roots.
+    #[inline(always)]
+    pub(super) fn square(&self, a: usize, b: usize) -> f32 {
+        square(self.position[a], self.position[b])
+    }
+
     /// Squared distance of two roots; infinite if they can't share a clump.
     #[inline(always)]
     pub(super) fn apart(&self, a: usize, b: usize) -> f32 {
-        let (p, q) = (self.position[a], self.position[b]);
-        let d: [f32; 3] = std::array::from_fn(|x| p[x] - q[x]);
         let (m, n) = (self.normal[a], self.normal[b]);
         let faces = m[0] * n[0] + m[1] * n[1] + m[2] * n[2] > 0.0;
         let parted = !self.side.is_empty() && {
             let ([l, r], [m, s]) = (self.side[a], self.side[b]);
             (l & s) | (r & m) != 0
         };
-        if faces && !parted { d[0] * d[0] + d[1] * d[1] + d[2] * d[2] } else { f32::INFINITY }
+        if faces && !parted { self.square(a, b) } else { f32::INFINITY }
     }
 }
 
@@ -223,21 +234,21 @@ pub fn whole_clumps(sites: &Sites, fine: &Members, radius: &[f32], mut coarse: M
         coarse.clump[h] = c;
         coarse.reach[h] = match c {
             NONE => 0.0,
-            c => {
-                let (p, q) = (sites.position[h], sites.position[coarse.centre[c as usize] as usize]);
-                let d2: f32 = (0..3).map(|x| (p[x] - q[x]) * (p[x] - q[x])).sum();
-                (d2.sqrt() / radius[c as usize]).min(1.0)
-            }
+            c => (sites.square(h, coarse.centre[c as usize] as usize).sqrt() / radius[c as usize]).min(1.0),
         };
     }
     coarse
 }
 
+/// For each hair the centre of its clump; itself without a clump.
+pub fn centre_of_each(m: &Members) -> Vec<u32> {
+    let centre = |(h, &c): (usize, &u32)| if c == NONE { h as u32 } else { m.centre[c as usize] };
+    m.clump.iter().enumerate().map(centre).collect()
+}
+
 /// Hairs that stand for themselves in a level above `fine`: its centres, and hairs without a clump.
 pub fn representatives(fine: &Members) -> Vec<bool> {
-    let mut out: Vec<bool> = fine.clump.iter().map(|&c| c == NONE).collect();
-    fine.centre.iter().for_each(|&h| out[h as usize] = true);
-    out
+    centre_of_each(fine).into_iter().enumerate().map(|(h, centre)| centre as usize == h).collect()
 }
 
 /// Rest roots of hairs as [`Sites`] have them, scene units relative to `origin`: positions and normals.
@@ -253,9 +264,8 @@ pub fn rest_sites(skin: &Skin, root: &[SurfacePoint], origin: [f64; 3]) -> (Vec<
 /// The hair whose root is nearest to each of some points (the lowest of equally near ones).
 pub fn nearest_hairs(position: &[[f32; 3]], points: &[[f32; 3]]) -> Vec<u32> {
     let nearest = |q: &[f32; 3]| {
-        let d2 = |p: &[f32; 3]| (0..3).map(|x| (p[x] - q[x]) * (p[x] - q[x])).sum::<f32>();
         let before = |a: (u32, f32), b: (u32, f32)| if b.1 < a.1 { b } else { a };
-        let all = position.iter().enumerate().map(|(h, p)| (h as u32, d2(p)));
+        let all = position.iter().enumerate().map(|(h, p)| (h as u32, square(*p, *q)));
         all.fold((0, f32::INFINITY), before).0
     };
     points.iter().map(nearest).collect()

@@ -68,8 +68,7 @@ pub fn regions(sites: &Sites, value: &[f32], near: f32, open: &[bool]) -> Member
     for pass in 0..2 {
         for &h in &order {
             let c = out.clump[h as usize] as usize;
-            let (p, q) = (sites.position[h as usize], sites.position[out.centre[c] as usize]);
-            let d = (0..3).map(|x| (p[x] - q[x]) * (p[x] - q[x])).sum::<f32>().sqrt();
+            let d = sites.square(h as usize, out.centre[c] as usize).sqrt();
             if pass == 0 {
                 most[c] = most[c].max(d);
             } else if most[c] > 0.0 {

@@ -237,6 +237,13 @@ pub struct Feature {
     pub noise: f64,
 }
 
+impl Feature {
+    /// Its map.
+    pub fn map(&self) -> Option<MapRef> {
+        self.map.clone().map(|map| MapRef { map, channel: self.channel, wrap: self.wrap })
+    }
+}
+
 /// Render width.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -307,6 +314,11 @@ impl ColorFeature {
     /// Factors at stations at equal distances from root to tip, if there is a ramp.
     pub fn stations(&self) -> Option<Vec<[f32; 3]>> {
         self.ramp.as_ref().map(|ramp| ramp.iter().map(|c| c.map(|x| x as f32)).collect())
+    }
+
+    /// Its map.
+    pub fn map(&self) -> Option<MapRef> {
+        self.map.clone().map(|map| MapRef { map, channel: Channel::default(), wrap: self.wrap })
     }
 }
 

@@ -1,9 +1,9 @@
 //! What displaces hairs after they are interpolated or simulated: `[[layer.clump]]`, `[layer.curl]`, `[[layer.wave]]`,
-//! `[[layer.noise]]`, `[layer.wind]`, `[layer.collision]` and `[[emitter]]` of the groom file, `[look]` of the shot file.
+//! `[[layer.noise]]`, `[layer.wind]`, `[layer.collision]` and `[[emitter]]` of the groom file.
 
 use super::document::{Fixed, exactly};
+use super::keyed::{Keyed, Vector};
 use super::look_value::{LookValue, Varied, VariedValue, varied};
-use super::simulate::{Keyed, Vector};
 use super::{Layer, MapRef};
 use schemars::JsonSchema;
 use serde::de::Deserializer;
@@ -500,61 +500,6 @@ fn some_frames<'de, D: Deserializer<'de>>(d: D) -> Result<Option<[i32; 2]>, D::E
     exactly(d).map(Some)
 }
 
-/// What a shot changes of the look of its groom.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct Look {
-    /// Clump hair. Default: true.
-    pub clump: bool,
-    /// Curl it. Default: true.
-    pub curl: bool,
-    /// Wave it. Default: true.
-    pub wave: bool,
-    /// Add noise. Default: true.
-    pub noise: bool,
-    /// Blow. Default: true.
-    pub wind: bool,
-    /// Keep finished hairs out of the skin. Default: true.
-    pub collision: bool,
-    /// Clumping of this shot.
-    #[serde(rename = "override")]
-    pub overrides: Vec<LookOverride>,
-}
-
-impl Default for Look {
-    fn default() -> Self {
-        Look { clump: true, curl: true, wave: true, noise: true, wind: true, collision: true, overrides: Vec::new() }
-    }
-}
-
-impl Look {
-    /// True if an operator acts in this shot.
-    pub fn has(&self, operator: Operator) -> bool {
-        match operator {
-            Operator::Clump => self.clump,
-            Operator::Curl => self.curl,
-            Operator::Wave => self.wave,
-            Operator::Noise => self.noise,
-            Operator::Wind => self.wind,
-        }
-    }
-}
-
-/// Percent and rate of a level of clumps in this shot.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct LookOverride {
-    /// Name of the layer.
-    pub layer: String,
-    /// Number of the level, from 0. Default: 0.
-    #[serde(default)]
-    pub clump: usize,
-    /// Percent instead of the groom's; its map and variation stay.
-    pub percent: Option<Keyed<f64>>,
-    /// Rate instead of the groom's; its map and variation stay.
-    pub rate: Option<Keyed<f64>>,
-}
-
 impl Clump {
     /// Parameters that act on hairs of a clump.
     pub fn varied(&self) -> Vec<Varied<'_>> {
@@ -570,8 +515,9 @@ impl Clump {
 
     /// Parameters that make clumps.
     pub fn making(&self) -> Vec<Varied<'_>> {
-        let density = self.density.iter().map(|d| varied("density", d, [0.0, 1e5]));
-        density.chain(self.size.iter().map(|s| varied("size", s, [0.0, 1e6]))).collect()
+        let making = |name, value, most| Varied { making: true, ..varied(name, value, [0.0, most]) };
+        let density = self.density.iter().map(|d| making("density", d, 1e5));
+        density.chain(self.size.iter().map(|s| making("size", s, 1e6))).collect()
     }
 }
 
@@ -604,6 +550,11 @@ impl Layer {
         }
         self.wind.iter().for_each(|w| add("wind".to_owned(), vec![varied("amplitude", &w.amplitude, [-1e6, 1e6])]));
         out
+    }
+
+    /// Parameters of the operator at a key that act on hairs at every moment.
+    pub fn acting(&self, key: &str) -> Vec<Varied<'_>> {
+        self.varied().into_iter().filter(|(k, v)| k == key && !v.making).map(|(_, v)| v).collect()
     }
 
     /// Other maps of the look, with their keys below the layer's.

@@ -1,8 +1,8 @@
 //! Checks of the look that types can't make.
 
 use super::document::{ConfigError, Document};
+use super::keyed::{Keyed, Vector};
 use super::look_value::Varied;
-use super::simulate::{Keyed, Vector};
 use super::{Clump, ClumpOf, Curl, CurlKind, GroomFile, Layer, Operator};
 
 impl Document<GroomFile> {

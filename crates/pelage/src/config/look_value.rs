@@ -1,6 +1,6 @@
 //! Numbers of the look: a value, key frames, or a table with a map and variation.
 
-use super::simulate::Keyed;
+use super::keyed::Keyed;
 use super::{Channel, MapRef, WrapMode};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -130,11 +130,13 @@ pub struct Varied<'a> {
     pub value: &'a LookValue,
     /// True if map and variation are added to it, not multiplied with it.
     pub added: bool,
+    /// True if clumps are made by it, once, and not moved by it at every moment.
+    pub making: bool,
     /// Smallest and largest value.
     pub range: [f64; 2],
 }
 
 /// A parameter whose map and variation multiply it.
 pub(super) fn varied<'a>(name: &'static str, value: &'a LookValue, range: [f64; 2]) -> Varied<'a> {
-    Varied { name, value, added: false, range }
+    Varied { name, value, added: false, making: false, range }
 }

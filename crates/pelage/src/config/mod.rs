@@ -2,6 +2,7 @@
 
 mod document;
 mod groom;
+mod keyed;
 mod look;
 mod look_check;
 mod look_value;
@@ -14,16 +15,17 @@ pub use groom::{
     Placement,
 };
 pub use groom::{Side, Space, WidthFeature, WrapMode};
+pub use keyed::{Amount, Key, Keyed, Vector};
 pub use look::{
-    Clump, ClumpOf, Collision, Curl, CurlKind, CurlWave, Dilation, Emitter, Look, LookOverride, Noise, Operator, Wave,
-    WaveAxis, WaveShape, WindLook,
+    Clump, ClumpOf, Collision, Curl, CurlKind, CurlWave, Dilation, Emitter, Noise, Operator, Wave, WaveAxis, WaveShape,
+    WindLook,
 };
 pub use look_value::{LookValue, Varied, VariedValue, VaryScale};
-pub use shot::{CacheSettings, Export, ExportFormat, GroomRef, Preview, Shot, ShotFile, Skin, UpAxis};
-pub use simulate::{
-    Amount, Key, Keyed, Material, SEGMENTS, Simulate, StrandModel, Target, Vector, WindSettings, check_material,
+pub use shot::{
+    CacheSettings, Export, ExportFormat, GroomRef, Look, LookOverride, Preview, Shot, ShotFile, Skin, UpAxis,
 };
 pub use simulate::{BodyKind, BodyMesh, BodySettings};
+pub use simulate::{Material, SEGMENTS, Simulate, StrandModel, Target, WindSettings, check_material};
 
 /// JSON Schema (draft 2020-12) of a shot file or a groom file, for editors.
 pub fn schema<T: schemars::JsonSchema>() -> String {

@@ -1,7 +1,8 @@
 //! The shot file, `pipeline.toml`.
 
 use super::document::{ConfigError, Document, exactly};
-use super::look::Look;
+use super::keyed::Keyed;
+use super::look::Operator;
 use super::simulate::{Simulate, Target};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -97,6 +98,61 @@ pub struct GroomRef {
     /// Point in scene units that the motion's rotation leaves in place. Default: the origin.
     #[serde(default, deserialize_with = "exactly")]
     pub pivot: [f64; 3],
+}
+
+/// What a shot changes of the look of its groom.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Look {
+    /// Clump hair. Default: true.
+    pub clump: bool,
+    /// Curl it. Default: true.
+    pub curl: bool,
+    /// Wave it. Default: true.
+    pub wave: bool,
+    /// Add noise. Default: true.
+    pub noise: bool,
+    /// Blow. Default: true.
+    pub wind: bool,
+    /// Keep finished hairs out of the skin. Default: true.
+    pub collision: bool,
+    /// Clumping of this shot.
+    #[serde(rename = "override")]
+    pub overrides: Vec<LookOverride>,
+}
+
+impl Default for Look {
+    fn default() -> Self {
+        Look { clump: true, curl: true, wave: true, noise: true, wind: true, collision: true, overrides: Vec::new() }
+    }
+}
+
+impl Look {
+    /// True if an operator acts in this shot.
+    pub fn has(&self, operator: Operator) -> bool {
+        match operator {
+            Operator::Clump => self.clump,
+            Operator::Curl => self.curl,
+            Operator::Wave => self.wave,
+            Operator::Noise => self.noise,
+            Operator::Wind => self.wind,
+        }
+    }
+}
+
+/// Percent and rate of a level of clumps in this shot.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LookOverride {
+    /// Name of the layer.
+    pub layer: String,
+    /// Number of the level, from 0. Default: 0.
+    #[serde(default)]
+    pub clump: usize,
+    /// Percent instead of the groom's; its map and variation stay.
+    pub percent: Option<Keyed<f64>>,
+    /// Rate instead of the groom's; its map and variation stay.
+    pub rate: Option<Keyed<f64>>,
 }
 
 /// Files to write.

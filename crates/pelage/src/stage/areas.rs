@@ -42,26 +42,25 @@ fn find(run: &mut Runner<'_>, frame: i32) -> Result<Hits, Error> {
         None => vec![Vec::new(); emitters.len()],
     };
     let first = project.shot.value.shot.frames[0];
-    let particles = (0..emitters.len()).map(|k| particles(run, k, first..frame + 1)).collect::<Result<Vec<_>, _>>()?;
-    let launched: usize = particles.iter().map(Vec::len).sum();
-    let now = |p: Vec<Particle>| p.into_iter().filter(|p| p.time >= f64::from(frame)).collect();
-    let particles: Vec<Vec<Particle>> = particles.into_iter().map(now).collect();
+    let emitters = 0..emitters.len();
+    let now = emitters.clone().map(|k| particles(run, k, frame..frame + 1)).collect::<Result<Vec<_>, _>>()?;
+    let launched = emitters.map(|k| launched(run, k, first..frame + 1)).sum::<Result<usize, _>>()?;
     if frame == first {
         note_early(run, first)?;
     }
     let at = &project.frames[&frame];
-    if particles.iter().any(|p| !p.is_empty()) {
+    if now.iter().any(|p| !p.is_empty()) {
         let skin = groom::skin(run)?;
         let posed;
         let (bvh, placement) = match at {
             SkinAt::Rest => (skin.bvh(), None),
             SkinAt::Rigid(t) => (skin.bvh(), Some(t)),
             SkinAt::File(_) => {
-                posed = Bvh::build(&skin.pose(at)?.position, &skin.mesh.triangle, &skin.topology);
+                posed = Bvh::build(&groom::pose(run, at)?.position, &skin.mesh.triangle, &skin.topology);
                 (&posed, None)
             }
         };
-        for (all, particles) in all.iter_mut().zip(&particles) {
+        for (all, particles) in all.iter_mut().zip(&now) {
             all.extend(find_hits(particles, bvh, placement));
         }
     }
@@ -72,35 +71,71 @@ fn find(run: &mut Runner<'_>, frame: i32) -> Result<Hits, Error> {
     Ok(all)
 }
 
-/// Particles of an emitter that leave from the start of `frames.start` to the start of `frames.end`.
-fn particles(run: &Runner<'_>, k: usize, frames: Range<i32>) -> Result<Vec<Particle>, Error> {
-    let shot = &run.project.shot.value.shot;
-    let e = &run.project.groom.value.emitter[k];
+/// Where the particles of an emitter come from.
+enum Source {
+    File(Rc<Vec<Particle>>),
+    Emitter(Emitter),
+}
+
+fn source(run: &mut Runner<'_>, k: usize) -> Result<Option<Source>, Error> {
     if !run.project.opens_areas(k) {
-        return Ok(Vec::new());
+        return Ok(None);
     }
+    let shot = &run.project.shot.value.shot;
     if let Some(file) = &run.project.particles[k] {
-        let all = csv::read_particles(&file.path, shot.fps)?;
-        let leaves = |p: &Particle| (f64::from(frames.start)..f64::from(frames.end)).contains(&p.time);
-        return Ok(all.into_iter().filter(leaves).collect());
+        if let Some(found) = run.particles.get(&k) {
+            return Ok(Some(Source::File(found.clone())));
+        }
+        let read = Rc::new(csv::read_particles(&file.path, shot.fps)?);
+        run.particles.insert(k, read.clone());
+        return Ok(Some(Source::File(read)));
     }
+    let e = &run.project.groom.value.emitter[k];
     let keys = e.position.iter().flat_map(|p| p.vectors().0);
-    let emitter = Emitter {
+    Ok(Some(Source::Emitter(Emitter {
         position: keys.map(|k| (k.frame, k.value)).collect(),
         direction: e.direction.map_or([0.0; 3], |d| d.0),
         spread: e.spread,
         rate: e.rate,
         seed: u64::from(e.seed),
         frames: e.frames.unwrap_or(shot.frames),
-    };
-    Ok(emitter.particles(frames, shot.fps))
+    })))
+}
+
+/// True for particles that leave from the start of `frames.start` to the start of `frames.end`.
+fn leaves(frames: &Range<i32>) -> impl Fn(&&Particle) -> bool {
+    let frames = f64::from(frames.start)..f64::from(frames.end);
+    move |p| frames.contains(&p.time)
+}
+
+/// Particles of an emitter that leave in some frames.
+fn particles(run: &mut Runner<'_>, k: usize, frames: Range<i32>) -> Result<Vec<Particle>, Error> {
+    let fps = run.project.shot.value.shot.fps;
+    Ok(match source(run, k)? {
+        Some(Source::File(all)) => all.iter().filter(leaves(&frames)).copied().collect(),
+        Some(Source::Emitter(e)) => e.particles(frames, fps),
+        None => Vec::new(),
+    })
+}
+
+/// How many they are.
+fn launched(run: &mut Runner<'_>, k: usize, frames: Range<i32>) -> Result<usize, Error> {
+    let fps = run.project.shot.value.shot.fps;
+    Ok(match source(run, k)? {
+        Some(Source::File(all)) => all.iter().filter(leaves(&frames)).count(),
+        Some(Source::Emitter(e)) => {
+            let numbers = e.numbers(frames, fps);
+            (numbers.end - numbers.start) as usize
+        }
+        None => 0,
+    })
 }
 
 /// Particles that leave before the shot begins meet no skin: that is told.
 fn note_early(run: &mut Runner<'_>, first: i32) -> Result<(), Error> {
     for (k, e) in run.project.groom.value.emitter.iter().enumerate() {
         let early = match e.file {
-            Some(_) => particles(run, k, i32::MIN..first)?.len(),
+            Some(_) => launched(run, k, i32::MIN..first)?,
             None if e.frames.is_some_and(|f| f[0] < first) && run.project.opens_areas(k) => 1,
             None => 0,
         };

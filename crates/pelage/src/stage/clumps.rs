@@ -7,13 +7,13 @@ use super::{What, groom, instance, layer_seed, plan_look::joins_clumps};
 use crate::Error;
 use crate::config::{Clump, LookValue, MapRef};
 use crate::format::ply::Column;
-use pelage_geom::{NONE, TiledMap, Vec3, rng};
+use pelage_geom::{NONE, Vec3, rng};
 use pelage_groom::instance::Roots;
 use pelage_groom::look::member::{
     Members, Sites, centres, members, nearest_hairs, representatives, rest_sites, sides, whole_clumps,
 };
 use pelage_groom::look::region::regions;
-use pelage_groom::look::vary::{Drawn, Scale, Vary, factors};
+use pelage_groom::look::vary::{Drawn, Scale, Vary, factors, shifts};
 use std::rc::Rc;
 
 /// Map value from which an area counts.
@@ -38,20 +38,19 @@ pub fn sites(run: &mut Runner<'_>, i: usize) -> Result<Rc<RestSites>, Error> {
     Ok(found)
 }
 
-/// Factors by which a parameter varies over a layer's hairs.
-pub fn varied(run: &mut Runner<'_>, hairs: &Drawn<'_>, name: &str, v: &LookValue) -> Result<Vec<f32>, Error> {
+/// How a parameter of that name varies over hairs: factors on it, or what is `added` to it. Empty if it does not.
+pub fn column(
+    run: &mut Runner<'_>,
+    hairs: &Drawn<'_>,
+    name: &str,
+    v: &LookValue,
+    added: bool,
+) -> Result<Vec<f32>, Error> {
     let map = v.map().map(|m| run.map(&m, Texel::Value)).transpose()?;
-    Ok(factors(hairs, &vary(v, map.as_ref(), &scales(v), name)))
-}
-
-/// Scales of a parameter as numbers of single precision.
-pub fn scales(v: &LookValue) -> Vec<Scale> {
-    v.0.vary.iter().map(|s| Scale { size: s.size as f32, deviation: s.deviation as f32 }).collect()
-}
-
-/// How a parameter of that name varies.
-pub fn vary<'a>(v: &LookValue, map: Option<&'a TiledMap>, scales: &'a [Scale], name: &str) -> Vary<'a> {
-    Vary { map, noise: v.0.noise as f32, scales, channel: rng::channel(name) }
+    let scales: Vec<Scale> =
+        v.0.vary.iter().map(|s| Scale { size: s.size as f32, deviation: s.deviation as f32 }).collect();
+    let vary = Vary { map: map.as_ref(), noise: v.0.noise as f32, scales: &scales, channel: rng::channel(name) };
+    Ok(if added { shifts(hairs, &vary) } else { factors(hairs, &vary) })
 }
 
 /// Clumps of a layer's level.
@@ -92,7 +91,7 @@ fn find(run: &mut Runner<'_>, i: usize, k: usize, what: What) -> Result<Members,
             (None, None) => 1.0 / cm2.sqrt(),
         })
     });
-    let factor = varied(run, &hairs, "size", &size)?;
+    let factor = column(run, &hairs, "size", &size, false)?;
     let radius = |h: u32| (size.at(0.0) as f32) * factor.get(h as usize).unwrap_or(&1.0);
     let partings: Vec<Vec<Vec3>> = groom::partings(run);
     let mut sites = Sites { position: &at.position, normal: &at.normal, side: &[] };
@@ -157,7 +156,7 @@ fn centre_hairs(
     }
     let density = c.density.as_ref().expect("checked: clumps have a density");
     let value = density.at(0.0) * run.project.cm2_per_unit2();
-    let factor = varied(run, hairs, "density", density)?;
+    let factor = column(run, hairs, "density", density, false)?;
     let area = groom::skin(run)?.area();
     Ok(centres(&roots.id, area, &|h| value * f64::from(*factor.get(h).unwrap_or(&1.0)), open))
 }

@@ -128,8 +128,7 @@ pub fn look(run: &mut Runner<'_>, i: usize) -> Result<HairLayer, Error> {
 /// All layers. What was read to make them is dropped: frames need the memory.
 fn hair_layers(run: &mut Runner<'_>) -> Result<Vec<HairLayer>, Error> {
     let layers = (0..run.project.groom.value.layer.len()).map(|i| hair_layer(run, i)).collect();
-    run.roots.clear();
-    run.layers.clear();
+    run.forget_layers();
     layers
 }
 

@@ -3,11 +3,12 @@
 use super::run::{Counts, Runner};
 use super::skin::Texel;
 use super::tables::{self, decode, encode, root_columns, roots_of, table, vector_columns, vectors_of};
-use super::{Skin, What};
+use super::{Skin, SkinPose, What};
 use crate::Error;
-use crate::config::{Comb, CombKind as Kind, MapRef, Side, Space};
+use crate::config::{Comb, CombKind as Kind, Side, Space};
 use crate::curves;
 use crate::format::ply;
+use crate::project::SkinAt;
 use pelage_geom::{Offsets, SurfacePoint, TiledMap, Vec3};
 use pelage_groom::candidates::candidates;
 use pelage_groom::comb::{CombKind, CombOp, DirectionSpace, comb};
@@ -104,8 +105,7 @@ fn place_hairs(run: &mut Runner<'_>) -> Result<(ControlHairs, Sites, Counts), Er
     let skin = skin(run)?;
     let groom = &run.project.groom.value;
     let (_, length) = run.project.control_length();
-    let length_map = length.map.clone().map(|map| MapRef { map, channel: length.channel, wrap: length.wrap });
-    let length_map = length_map.map(|m| run.map(&m, Texel::Value)).transpose()?;
+    let length_map = length.map().map(|m| run.map(&m, Texel::Value)).transpose()?;
     let partings: Vec<Vec<Vec3>> = partings(run);
     let p = &groom.control.placement;
     let per_unit2 = p.per_cm2.unwrap_or(0.0) * run.project.cm2_per_unit2();
@@ -167,6 +167,16 @@ fn place_hairs(run: &mut Runner<'_>) -> Result<(ControlHairs, Sites, Counts), Er
             .push(format!("drawn hairs were moved onto the skin by {mean:.2} mm on average, {max:.2} mm at most"));
     }
     Ok((hairs, sites, counts))
+}
+
+/// The skin at a moment. Layers and stages ask for the same one after another: the last is kept.
+pub fn pose(run: &mut Runner<'_>, at: &SkinAt) -> Result<Rc<SkinPose>, Error> {
+    if let Some((_, pose)) = run.pose.as_ref().filter(|(last, _)| last == at) {
+        return Ok(pose.clone());
+    }
+    let pose = Rc::new(skin(run)?.pose(at)?);
+    run.pose = Some((at.clone(), pose.clone()));
+    Ok(pose)
 }
 
 pub(super) fn view(skin: &Skin) -> control::Skin<'_> {

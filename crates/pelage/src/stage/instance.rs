@@ -5,7 +5,7 @@ use super::skin::Texel;
 use super::tables::{decode, encode, id_columns, ids_of, root_columns, roots_of, table, vector_columns, vectors_of};
 use super::{Skin, What, candidate_density, groom, layer_seed};
 use crate::Error;
-use crate::config::{Feature, Guard, MapRef};
+use crate::config::{Feature, Guard};
 use crate::format::ply::Column;
 use pelage_geom::{SurfacePoint, TiledMap, rng};
 use pelage_groom::candidates::{Candidates, candidates as find_candidates};
@@ -175,8 +175,7 @@ fn decode_weights(bytes: &[u8]) -> Option<Weights> {
 }
 
 fn feature_map(run: &mut Runner<'_>, f: &Feature) -> Result<Option<TiledMap>, Error> {
-    let map = f.map.clone().map(|map| MapRef { map, channel: f.channel, wrap: f.wrap });
-    map.map(|m| run.map(&m, Texel::Value)).transpose()
+    f.map().map(|m| run.map(&m, Texel::Value)).transpose()
 }
 
 /// A column of one number per hair: length in scene units, root diameter in micrometres, opacity.
@@ -220,7 +219,7 @@ pub fn color(run: &mut Runner<'_>, i: usize) -> Result<Vec<[f32; 3]>, Error> {
     }
     let roots = roots(run, i)?;
     let color = &run.project.groom.value.layer[i].color;
-    let map = color.map.clone().map(|map| MapRef { map, channel: Default::default(), wrap: color.wrap });
+    let map = color.map();
     let map = map.map(|m| run.map(&m, Texel::Color)).transpose()?;
     let value = color.value.map(|x| x as f32);
     let seed = u64::from(layer_seed(&run.project.groom.value.layer[i].name));

@@ -54,9 +54,9 @@ pub fn positions(run: &mut Runner<'_>, what: What) -> Result<Vec<[f32; 3]>, Erro
 
 /// A layer's hairs at rest or at a frame.
 pub fn hairs(run: &mut Runner<'_>, what: What) -> Result<Displaced, Error> {
-    let (i, frame, at) = match what {
-        What::Rest(i) | What::Finished(i) => (i, None, SkinAt::Rest),
-        What::Frame(i, f) => (i, Some(f), run.project.frames[&f].clone()),
+    let (i, at) = match what {
+        What::Rest(i) | What::Finished(i) => (i, SkinAt::Rest),
+        What::Frame(i, f) => (i, run.project.frames[&f].clone()),
         other => unreachable!("{other:?} has no positions"),
     };
     if let Some(entry) = run.fetch(what)
@@ -80,18 +80,15 @@ pub fn hairs(run: &mut Runner<'_>, what: What) -> Result<Displaced, Error> {
         ("hairs".to_owned(), count as u64),
         ("hairs with cancelled directions".to_owned(), cancelled as u64),
     ]);
-    let out = if look::acts(run, what) {
-        look::finish(run, what, frame, &at, base, &mut counts)?
-    } else {
-        Displaced { position: base, wet: Vec::new() }
-    };
+    let out = look::finish(run, what, &at, base, &mut counts)?;
     counts.insert("points".to_owned(), out.position.len() as u64);
     let name = run.plan.step(what).name.clone();
     let mut file = std::io::Cursor::new(Vec::with_capacity(out.position.len() * 12 + 4096));
     let wet: Vec<[f32; 3]> = out.wet.iter().map(|w| [w[0], w[1], 0.0]).collect();
     let both: [&[[f32; 3]]; 2] = [&out.position, &wet];
     let arrays = if wet.is_empty() { &both[..1] } else { &both[..] };
-    mcap::write_frame_payload(&mut file, &name, frame.unwrap_or(0), arrays).expect("writing to memory does not fail");
+    mcap::write_frame_payload(&mut file, &name, what.frame().unwrap_or(0), arrays)
+        .expect("writing to memory does not fail");
     run.keep(what, counts, &[("frame.mcap", file.get_ref())])?;
     Ok(out)
 }
@@ -116,7 +113,7 @@ pub fn undisplaced(run: &mut Runner<'_>, i: usize) -> Result<Vec<[f32; 3]>, Erro
 fn blended(run: &mut Runner<'_>, what: What, i: usize, at: &SkinAt) -> Result<(Vec<[f32; 3]>, usize), Error> {
     let skin = groom::skin(run)?;
     let layer = layer(run, i)?;
-    let pose = skin.pose(at)?;
+    let pose = groom::pose(run, at)?;
     let control = match (what, run.project.target(i)) {
         (What::Frame(_, f), Target::ControlHairs) => {
             let simulated = simulate::positions(run, i, f)?;

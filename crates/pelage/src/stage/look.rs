@@ -1,7 +1,7 @@
 //! The look: what displaces a layer's hairs at rest or at a frame, part after part.
 
 use super::clumps::{self, RestSites};
-use super::plan_look::{Effect, by_clump, collides, overridden};
+use super::plan_look::{Effect, by_clump, changes_hairs, collides, look_in, overridden};
 use super::run::{Counts, Runner};
 use super::skin::Texel;
 use super::{SkinPose, What, groom, instance, interpolate, layer_seed};
@@ -16,10 +16,10 @@ use pelage_groom::instance::Roots;
 use pelage_groom::look::axes::{RootAxes, carried, rest_axes};
 use pelage_groom::look::clump::{Clump, bind_lines, centre_lines, clump, dilations, drawn_lines, wet};
 use pelage_groom::look::curl::{Curl, Wave as CurlWave, curl, dished, helix, uniplanar};
-use pelage_groom::look::member::Members;
+use pelage_groom::look::member::{Members, centre_of_each};
 use pelage_groom::look::noise::{Noise, noise};
 use pelage_groom::look::refine::refine;
-use pelage_groom::look::vary::{Drawn, factors, shifts};
+use pelage_groom::look::vary::Drawn;
 use pelage_groom::look::wave::{Axis, RootVariable, Shape, Stations, Waves, root_variable, wave};
 use pelage_groom::look::wind::{Wind, wind};
 use pelage_groom::look::{Param, perlin};
@@ -33,12 +33,21 @@ const SMOOTH: f64 = 8.0;
 /// What the look reads of a layer that does not change over the shot.
 #[derive(Debug, Default)]
 pub struct LayerLook {
-    /// Factors or shifts of parameters, by operator and key.
-    column: BTreeMap<String, Vec<f32>>,
+    /// How parameters vary from hair to hair, by operator and key.
+    column: BTreeMap<String, Column>,
+    /// Root variables of waves, by their number.
+    root: BTreeMap<usize, Vec<f32>>,
     /// Axes of the roots at rest, in their root frames; empty if nothing needs them.
     axes: Vec<RootAxes>,
     /// Lines drawn by hand, in the axes of their carriers, by level.
     drawn: BTreeMap<usize, Vec<[f32; 3]>>,
+}
+
+/// How a parameter varies from hair to hair: factors on its value, or what is added to it.
+#[derive(Debug)]
+struct Column {
+    added: bool,
+    value: Vec<f32>,
 }
 
 /// Hairs as they are displaced.
@@ -63,18 +72,19 @@ impl Displaced {
 pub fn finish(
     run: &mut Runner<'_>,
     what: What,
-    frame: Option<i32>,
     at: &SkinAt,
     base: Vec<[f32; 3]>,
     counts: &mut Counts,
 ) -> Result<Displaced, Error> {
-    let (acting, last) = run.plan.step(what).look(run.project);
+    let (acting, last) = look_in(run.project, what);
     let i = what.layer().expect("hairs are of a layer");
+    let mut out = Displaced { position: base, wet: Vec::new() };
+    if !changes_hairs(run.project, i, &acting, last) {
+        return Ok(out);
+    }
     let from = run.project.base_points(i);
     let points = if last { run.project.points(i) } else { from };
-    let skin = groom::skin(run)?;
-    let pose = skin.pose(at)?;
-    let mut out = Displaced { position: base, wet: Vec::new() };
+    let (skin, pose) = (groom::skin(run)?, groom::pose(run, at)?);
     out.position = refined(out.position, from, points);
     if !acting.is_empty() {
         let look = prepared(run, what, &acting, points, &out.position)?;
@@ -84,6 +94,7 @@ pub fn finish(
             false => carried(&skin.mesh, &skin.topology, &pose, &roots.root, &look.axes),
         };
         let sites = clumps::sites(run, i)?;
+        let frame = what.frame();
         let mut job = Job { i, points, frame, look: &look, axes: &axes, roots: &roots, sites: &sites, out: &mut out };
         for effect in acting {
             job.act(run, effect)?;
@@ -208,48 +219,29 @@ fn columns(
     let layer = &project.groom.value.layer[i];
     let (key, seed) = (effect.key(), u64::from(layer_seed(&layer.name)));
     let own = Drawn { id: &roots.id, uv: &roots.uv, position: &sites.position, seed };
-    let of_clump = match (effect, &layer.curl) {
-        (Effect::Curl, Some(c)) if c.per_clump => Some(representatives(run, i)?),
-        _ => None,
+    // Hairs of a clump curl as its centre does.
+    let centres = match by_clump(project, i).filter(|_| effect == Effect::Curl) {
+        Some(k) => centre_of_each(&*clumps::clumps(run, i, k)?),
+        None => Vec::new(),
     };
     let of = |h: &u32| *h as usize;
-    let (id, uv, position): (Vec<_>, Vec<_>, Vec<_>) = match &of_clump {
-        Some(r) => (
-            r.iter().map(|h| roots.id[of(h)]).collect(),
-            r.iter().map(|h| roots.uv[of(h)]).collect(),
-            r.iter().map(|h| sites.position[of(h)]).collect(),
-        ),
-        None => Default::default(),
-    };
-    let hairs = if of_clump.is_some() { Drawn { id: &id, uv: &uv, position: &position, seed } } else { own };
-    for (_, v) in layer.varied().into_iter().filter(|(k, _)| *k == key) {
-        if matches!((effect, v.name), (Effect::Clump(_), "density" | "size")) {
-            continue;
-        }
+    let id: Vec<_> = centres.iter().map(|h| roots.id[of(h)]).collect();
+    let uv: Vec<_> = centres.iter().map(|h| roots.uv[of(h)]).collect();
+    let position: Vec<_> = centres.iter().map(|h| sites.position[of(h)]).collect();
+    let hairs = if centres.is_empty() { own } else { Drawn { id: &id, uv: &uv, position: &position, seed } };
+    for v in layer.acting(&key) {
         let name = format!("{key}.{}", v.name);
-        let map = v.value.map().map(|m| run.map(&m, Texel::Value)).transpose()?;
-        let scales = clumps::scales(v.value);
-        let vary = clumps::vary(v.value, map.as_ref(), &scales, &name);
-        let column = if v.added { shifts(&hairs, &vary) } else { factors(&hairs, &vary) };
-        look.column.insert(name, column);
+        let value = clumps::column(run, &hairs, &name, v.value, v.added)?;
+        look.column.insert(name, Column { added: v.added, value });
     }
     if let Effect::Wave(k) = effect {
         let w = &layer.wave[k];
         let map = w.map.as_ref().map(|m| run.map(m, Texel::Value)).transpose()?;
         let channel = rng::channel(&key);
         let v = RootVariable { map: map.as_ref(), size: w.size as f32, stray: w.stray as f32, channel };
-        look.column.insert(format!("{key}.r"), root_variable(&own, &v));
+        look.root.insert(k, root_variable(&own, &v));
     }
     Ok(())
-}
-
-/// For each hair the centre of its clump in the last level, or itself.
-fn representatives(run: &mut Runner<'_>, i: usize) -> Result<Vec<u32>, Error> {
-    let Some(last) = by_clump(run.project, i) else {
-        return Ok((0..instance::roots(run, i)?.id.len() as u32).collect());
-    };
-    let m = clumps::clumps(run, i, last)?;
-    Ok(m.clump.iter().enumerate().map(|(h, c)| if *c == NONE { h as u32 } else { m.centre[*c as usize] }).collect())
 }
 
 /// Curls that the hair has too few points to draw are told.
@@ -297,9 +289,11 @@ impl<'a> Job<'a, '_> {
     /// A parameter at this moment.
     fn param(&self, run: &Runner<'_>, effect: Effect, name: &str, v: &LookValue) -> Param<'a> {
         let value = v.at(run.project.moment(self.frame)) as f32;
-        let column = self.look.column.get(&format!("{}.{name}", effect.key())).map_or(&[][..], Vec::as_slice);
-        let added = matches!((effect, name), (Effect::Curl, "phase" | "angle"));
-        if added { Param { value, factor: &[], shift: column } } else { Param { value, factor: column, shift: &[] } }
+        match self.look.column.get(&format!("{}.{name}", effect.key())) {
+            Some(Column { added: true, value: shift }) => Param { value, factor: &[], shift },
+            Some(Column { added: false, value: factor }) => Param { value, factor, shift: &[] },
+            None => Param { value, ..Param::default() },
+        }
     }
 
     fn act(&mut self, run: &mut Runner<'_>, effect: Effect) -> Result<(), Error> {
@@ -339,7 +333,7 @@ impl<'a> Job<'a, '_> {
                     shape: if w.shape == WaveShape::Sine { Shape::Sine } else { Shape::Noise },
                     axis: [axis_of(&w.x), axis_of(&w.y)],
                     strength: self.param(run, effect, "strength", &w.strength),
-                    r: &self.look.column[&format!("{}.r", effect.key())],
+                    r: &self.look.root[&k],
                     keep_length: w.keep_length,
                     axes: self.axes,
                     seed,
@@ -493,12 +487,4 @@ fn axis_of(a: &config::WaveAxis) -> Axis {
         frequency: stations(a.frequency, a.frequency_deviation, a.frequency_scale),
         phase: [a.phase as f32, a.phase_deviation as f32, a.phase_scale as f32],
     }
-}
-
-/// True if a step of a layer needs more than the hairs that come into it.
-pub fn acts(run: &Runner<'_>, what: What) -> bool {
-    let i = what.layer().expect("hairs are of a layer");
-    let (acting, last) = run.plan.step(what).look(run.project);
-    let refined = last && run.project.points(i) != run.project.base_points(i);
-    !acting.is_empty() || refined || (last && collides(run.project, i))
 }

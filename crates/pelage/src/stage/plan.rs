@@ -1,7 +1,7 @@
 //! Every step of a shot with its recipe: what each step reads, and nothing else, enters its key.
 
 use super::Stage;
-use super::plan_look::{Hairs, effects, finished_rest};
+use super::plan_look::finished_rest;
 use crate::cache::{Field, Recipe};
 use crate::config::{Comb, ExportFormat, Feature, MapRef, Parting, Target};
 use crate::project::{Project, SkinAt, frame_list};
@@ -165,27 +165,15 @@ impl Plan {
             r.unit(Recipe::new("instance/curves", version::CURVES)).file("curves", &file.hash, file.label.clone());
         self.add(What::Curves, "instance/curves".into(), Stage::Instance, r.rest(recipe), &[]);
         let recipe = r.points(0, Recipe::new("interpolate", version::INTERPOLATE));
-        self.add_rest(r, 0, "interpolate/hair/rest".into(), recipe, vec![What::Curves]);
-    }
-
-    /// A layer's hairs at the rest pose.
-    fn add_rest(&mut self, r: &Reader<'_>, i: usize, name: String, recipe: Recipe, reads: Vec<What>) {
-        let (what, skin) = (What::Rest(i), &SkinAt::Rest);
-        let [simulated, after] = effects(r.project, i);
-        let every = r.project.target(i) == Target::EveryHair;
-        let effects = if every { &simulated } else { &after };
-        let last = finished_rest(r.project, i) == what;
-        self.add_hairs(r, Hairs { what, name, recipe, effects, last, frame: None, skin }, reads);
+        let name = "interpolate/hair/rest".to_owned();
+        self.add_hairs(r, What::Rest(0), name, recipe, vec![What::Curves], &SkinAt::Rest);
     }
 
     /// A simulated layer's finished hairs at the rest pose.
     fn add_finished(&mut self, r: &Reader<'_>, i: usize) {
         let name = format!("interpolate/{}/finished", r.project.groom.value.layer[i].name);
         let recipe = Recipe::new("interpolate", version::INTERPOLATE);
-        let [_, after] = effects(r.project, i);
-        let (what, skin) = (What::Finished(i), &SkinAt::Rest);
-        let step = Hairs { what, name, recipe, effects: &after, last: true, frame: None, skin };
-        self.add_hairs(r, step, vec![What::Rest(i)]);
+        self.add_hairs(r, What::Finished(i), name, recipe, vec![What::Rest(i)], &SkinAt::Rest);
     }
 
     /// A layer's finished hairs at a frame.
@@ -197,10 +185,7 @@ impl Plan {
             Target::Off => &[What::Comb, What::Roots(i), What::Weights(i), What::Length(i)],
         };
         let name = format!("interpolate/{}/{frame}", r.project.groom.value.layer[i].name);
-        let [_, after] = effects(r.project, i);
-        let (what, recipe) = (What::Frame(i, frame), r.frame(i, at, frame));
-        let step = Hairs { what, name, recipe, effects: &after, last: true, frame: Some(frame), skin: at };
-        self.add_hairs(r, step, reads.to_vec());
+        self.add_hairs(r, What::Frame(i, frame), name, r.frame(i, at, frame), reads.to_vec(), at);
     }
 
     /// Steps of a groom up to the hairs' rest pose.
@@ -236,7 +221,7 @@ impl Plan {
             let rest = Recipe::new("interpolate", version::INTERPOLATE);
             let rest = r.skin(r.points(i, rest), &SkinAt::Rest, 0);
             plan.add_clumps(r, i);
-            plan.add_rest(r, i, name, rest, reads.to_vec());
+            plan.add_hairs(r, What::Rest(i), name, rest, reads.to_vec(), &SkinAt::Rest);
         }
     }
 
@@ -291,6 +276,14 @@ fn changes(now: &Recipe, before: &Recipe) -> Vec<String> {
 }
 
 impl What {
+    /// The frame that it is made for; `None` for what is made once.
+    pub fn frame(self) -> Option<i32> {
+        match self {
+            What::Frame(_, f) | What::Hits(f) => Some(f),
+            _ => None,
+        }
+    }
+
     /// The layer that it belongs to, if it belongs to one.
     pub fn layer(self) -> Option<usize> {
         match self {
@@ -367,8 +360,7 @@ impl<'a> Reader<'a> {
         let at = self.in_groom(key);
         let recipe = Recipe::new("", 0).param(&format!("{name}.value"), f.value, format!("{at}.value"));
         let recipe = recipe.param(&format!("{name}.noise"), f.noise, format!("{at}.noise"));
-        let map = f.map.clone().map(|map| MapRef { map, channel: f.channel, wrap: f.wrap });
-        recipe.with(map.iter().flat_map(|m| self.map(name, m))).fields
+        recipe.with(f.map().iter().flat_map(|m| self.map(name, m))).fields
     }
 
     fn place(&self) -> Recipe {
@@ -490,7 +482,7 @@ impl<'a> Reader<'a> {
         let r = Recipe::new("instance/color", version::COLUMN);
         let r = r.param("value", format!("{:?}", c.value), format!("{at}.value"));
         let r = r.param("noise", c.noise, format!("{at}.noise"));
-        let map = c.map.clone().map(|map| MapRef { map, channel: Default::default(), wrap: c.wrap });
+        let map = c.map();
         r.with(map.iter().flat_map(|m| self.map("color", m)))
     }
 

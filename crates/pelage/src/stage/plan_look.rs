@@ -1,7 +1,7 @@
 //! What the look reads: clumps, and what displaces the hairs of a frame.
 
 use super::Stage;
-use super::plan::{Plan, Reader, Step, What, layer_seed, version};
+use super::plan::{Plan, Reader, What, layer_seed, version};
 use crate::cache::{Field, Recipe};
 use crate::config::{Clump, ClumpOf, Keyed, LookValue, Operator, Target, Varied};
 use crate::project::{Project, SkinAt};
@@ -67,10 +67,15 @@ pub fn effects(project: &Project, i: usize) -> [Vec<Effect>; 2] {
     out
 }
 
+/// Levels of clumps of a layer that act, before or after the simulation.
+fn acting_clumps(project: &Project, i: usize) -> Vec<usize> {
+    let acting = effects(project, i).concat();
+    (0..project.groom.value.layer[i].clump.len()).filter(|k| acting.contains(&Effect::Clump(*k))).collect()
+}
+
 /// True if clumps of a layer change widths and opacities.
 pub fn is_wet(project: &Project, i: usize) -> bool {
-    let wet = |e: &Effect| matches!(e, Effect::Clump(k) if project.groom.value.layer[i].clump[*k].wet.is_some());
-    effects(project, i).iter().flatten().any(wet)
+    acting_clumps(project, i).into_iter().any(|k| project.groom.value.layer[i].clump[k].wet.is_some())
 }
 
 /// True if finished hairs of a layer are kept out of the skin. Hair from a curves file is taken as it is.
@@ -78,15 +83,26 @@ pub fn collides(project: &Project, i: usize) -> bool {
     project.curves.is_none() && project.shot.value.look.collision && project.groom.value.layer[i].collision.enabled
 }
 
-/// True if a layer's hairs change after they are simulated or interpolated.
-fn is_finished_later(project: &Project, i: usize) -> bool {
-    !effects(project, i)[1].is_empty() || collides(project, i) || project.points(i) != project.base_points(i)
+/// True if `acting` or what finishes a layer's hairs changes those that come into a step; `last` if they leave it finished.
+pub fn changes_hairs(project: &Project, i: usize, acting: &[Effect], last: bool) -> bool {
+    let finished = collides(project, i) || project.points(i) != project.base_points(i);
+    !acting.is_empty() || (last && finished)
 }
 
 /// The step that makes a layer's finished hairs at the rest pose.
 pub fn finished_rest(project: &Project, i: usize) -> What {
-    let simulated = project.target(i) == Target::EveryHair;
-    if simulated && is_finished_later(project, i) { What::Finished(i) } else { What::Rest(i) }
+    let later = changes_hairs(project, i, &effects(project, i)[1], true);
+    if project.target(i) == Target::EveryHair && later { What::Finished(i) } else { What::Rest(i) }
+}
+
+/// The look that acts in a step that makes hairs, and true if they leave it finished.
+pub fn look_in(project: &Project, what: What) -> (Vec<Effect>, bool) {
+    let i = what.layer().expect("hairs are of a layer");
+    let [simulated, after] = effects(project, i);
+    match what {
+        What::Rest(_) if project.target(i) == Target::EveryHair => (simulated, finished_rest(project, i) == what),
+        _ => (after, true),
+    }
 }
 
 /// The value of a clump's parameter in this shot, and the key that says it.
@@ -103,11 +119,10 @@ pub fn overridden<'a>(project: &'a Project, i: usize, k: usize, v: &Varied<'a>) 
     })
 }
 
-/// The level of clumps whose hairs curl alike: the last that acts, before or after the simulation.
+/// The level of clumps whose hairs curl alike: the last that acts.
 pub fn by_clump(project: &Project, i: usize) -> Option<usize> {
-    let layer = &project.groom.value.layer[i];
-    let acts = |k: &usize| effects(project, i).iter().flatten().any(|e| *e == Effect::Clump(*k));
-    layer.curl.as_ref().filter(|c| c.per_clump).and_then(|_| (0..layer.clump.len()).rev().find(acts))
+    let together = project.groom.value.layer[i].curl.as_ref().is_some_and(|c| c.per_clump);
+    acting_clumps(project, i).pop().filter(|_| together)
 }
 
 /// True if a level of clumps joins the clumps of the level before.
@@ -120,8 +135,7 @@ impl Plan {
     /// Steps that make a layer's clumps.
     pub(super) fn add_clumps(&mut self, r: &Reader<'_>, i: usize) {
         let layer = &r.project.groom.value.layer[i];
-        let [simulated, after] = effects(r.project, i);
-        for k in (0..layer.clump.len()).filter(|k| simulated.iter().chain(&after).any(|e| *e == Effect::Clump(*k))) {
+        for k in acting_clumps(r.project, i) {
             let what = What::Clump(i, k as u32);
             let mut reads = vec![What::Roots(i)];
             reads.extend(joins_clumps(&layer.clump[k], k).then(|| What::Clump(i, k as u32 - 1)));
@@ -144,11 +158,19 @@ impl Plan {
         }
     }
 
-    /// Adds a step that makes hairs of a layer, displaced by `effects`; `frame` is `None` for the rest pose.
-    pub(super) fn add_hairs(&mut self, r: &Reader<'_>, step: Hairs<'_>, mut reads: Vec<What>) {
-        let Hairs { what, name, mut recipe, effects, last, frame, skin } = step;
+    /// Adds a step that makes hairs of a layer on a skin; `recipe` and `reads` are what it reads apart from the look.
+    pub(super) fn add_hairs(
+        &mut self,
+        r: &Reader<'_>,
+        what: What,
+        name: String,
+        mut recipe: Recipe,
+        mut reads: Vec<What>,
+        skin: &SkinAt,
+    ) {
         let i = what.layer().expect("hairs are of a layer");
-        for effect in effects {
+        let (frame, (effects, last)) = (what.frame(), look_in(r.project, what));
+        for effect in &effects {
             recipe = recipe.with(r.effect(i, *effect, frame));
             match effect {
                 // The rest pose is without areas.
@@ -201,21 +223,6 @@ impl Plan {
         }
         self.add(what, name, Stage::Interpolate, recipe, &reads);
     }
-}
-
-/// A step that makes hairs.
-pub(super) struct Hairs<'a> {
-    pub what: What,
-    pub name: String,
-    /// What it reads apart from the look.
-    pub recipe: Recipe,
-    /// The look that acts in it.
-    pub effects: &'a [Effect],
-    /// True if its hairs are finished.
-    pub last: bool,
-    /// `None` for the rest pose.
-    pub frame: Option<i32>,
-    pub skin: &'a SkinAt,
 }
 
 impl Reader<'_> {
@@ -279,9 +286,8 @@ impl Reader<'_> {
         if frame.is_none() && (areas || effect == Effect::Wind) {
             return Vec::new();
         }
-        for (_, v) in layer.varied().into_iter().filter(|(k, _)| *k == key) {
-            let made_before = matches!((effect, v.name), (Effect::Clump(_), "density" | "size"));
-            if made_before || (areas && matches!(v.name, "percent" | "rate")) {
+        for v in layer.acting(&key) {
+            if areas && matches!(v.name, "percent" | "rate") {
                 continue;
             }
             let fields = self.value(&format!("{key}.{}", v.name), &format!("{at}.{}", v.name), v.value, moment);
@@ -396,19 +402,5 @@ impl Reader<'_> {
                 .fold(r, |r, f| r.file(&format!("{name}.file"), &f.hash, f.label.clone()));
         }
         r.param("first", shot.frames[0], self.in_shot("shot.frames (first)"))
-    }
-}
-
-impl Step {
-    /// The look that acts in this step of a project, and true if its hairs are finished.
-    pub fn look(&self, project: &Project) -> (Vec<Effect>, bool) {
-        let i = self.what.layer().expect("hairs are of a layer");
-        let [simulated, after] = effects(project, i);
-        match self.what {
-            What::Rest(_) if project.target(i) == Target::EveryHair => {
-                (simulated, finished_rest(project, i) == self.what)
-            }
-            _ => (after, true),
-        }
     }
 }

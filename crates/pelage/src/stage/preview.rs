@@ -12,6 +12,7 @@ use pelage_light::{
     Camera, HairView, Image, Region, Scene, Settings, SkinView, contact_sheet, render_region, studio_lights,
 };
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 /// Linear grey of the background: dark enough for light hair, light enough for dark hair.
 const BACKGROUND: [f32; 3] = [0.16, 0.17, 0.19];
@@ -175,9 +176,9 @@ fn camera(run: &mut Runner<'_>, drawn: &Drawn, frames: &[i32]) -> Result<Camera,
 }
 
 /// The skin at a frame, if there is one.
-fn pose(run: &mut Runner<'_>, frame: i32) -> Result<Option<SkinPose>, Error> {
+fn pose(run: &mut Runner<'_>, frame: i32) -> Result<Option<Rc<SkinPose>>, Error> {
     match &run.project.rest {
-        Some(_) => Ok(Some(groom::skin(run)?.pose(&run.project.frames[&frame])?)),
+        Some(_) => groom::pose(run, &run.project.frames[&frame]).map(Some),
         None => Ok(None),
     }
 }

@@ -5,7 +5,7 @@ use crate::Error;
 use crate::cache::{Entry, FileHashes, Recipe, Store};
 use crate::config::MapRef;
 use crate::progress::Progress;
-use crate::project::{Project, frame_list};
+use crate::project::{Project, SkinAt, frame_list};
 use crate::report::{Report, StageReport, cpu_seconds, peak_bytes};
 use crate::timeline::Timeline;
 use pelage_geom::TiledMap;
@@ -60,12 +60,16 @@ pub struct Runner<'a> {
     /// Warnings of the stage that runs.
     pub warnings: Vec<String>,
     pub(super) skin: Option<Rc<skin::Skin>>,
+    /// Where the skin was last, and its pose there.
+    pub(super) pose: Option<(SkinAt, Rc<skin::SkinPose>)>,
     pub(super) roots: BTreeMap<usize, Rc<pelage_groom::instance::Roots>>,
     pub(super) layers: BTreeMap<usize, Rc<super::interpolate::LayerHairs>>,
     pub(super) sites: BTreeMap<usize, Rc<super::clumps::RestSites>>,
     pub(super) members: BTreeMap<(usize, usize), Rc<pelage_groom::look::member::Members>>,
     pub(super) looks: BTreeMap<(usize, bool), Rc<super::look::LayerLook>>,
     pub(super) barrier: Option<Rc<super::look::Barrier>>,
+    /// Particles of emitters that have a file.
+    pub(super) particles: BTreeMap<usize, Rc<Vec<pelage_groom::areas::Particle>>>,
     pub(super) hits: Option<(i32, Rc<super::areas::Hits>)>,
     pub(super) placed: Option<pelage_groom::control::ControlHairs>,
     pub(super) control: Option<Rc<pelage_groom::control::ControlHairs>>,
@@ -101,12 +105,14 @@ impl<'a> Runner<'a> {
             store,
             warnings: Vec::new(),
             skin: None,
+            pose: None,
             roots: BTreeMap::new(),
             layers: BTreeMap::new(),
             sites: BTreeMap::new(),
             members: BTreeMap::new(),
             looks: BTreeMap::new(),
             barrier: None,
+            particles: BTreeMap::new(),
             hits: None,
             placed: None,
             control: None,
@@ -170,6 +176,15 @@ impl<'a> Runner<'a> {
     /// Shows the fraction done of something that takes long; false as soon as the run is to stop.
     pub(super) fn ticker(&self, what: &str) -> impl Fn(f64) -> bool + Sync + use<> {
         self.progress.ticker(what)
+    }
+
+    /// Drops what was read of the layers' hairs: it is read again where it is needed.
+    pub(super) fn forget_layers(&mut self) {
+        self.roots.clear();
+        self.layers.clear();
+        self.sites.clear();
+        self.members.clear();
+        self.looks.clear();
     }
 
     /// Scene-space point that positions are relative to.
@@ -395,11 +410,10 @@ impl<'a> Runner<'a> {
         let mut moments: BTreeMap<Option<i32>, Counts> = BTreeMap::new();
         for step in steps {
             let moment = match step.what {
-                What::Frame(_, f) | What::Hits(f) => Some(f),
                 What::Simulate(_, k) => Some(k as i32),
                 // Hairs of the rest pose a second time.
                 What::Finished(_) => Some(i32::MIN),
-                _ => None,
+                what => what.frame(),
             };
             let found = self.ran.get(&step.what).cloned().or_else(|| self.store.counts(&step.recipe.key()));
             for (name, n) in found.unwrap_or_default() {

@@ -3,8 +3,8 @@
 //! * [`McapHair`] writes a shot: on topic `/hair/LAYER/topology` one message, on `/hair/LAYER/frames` one a frame. They
 //!   are protobuf messages (`pelage.HairTopology`, `pelage.HairFrame`) whose description is in the file, so any MCAP
 //!   reader decodes them. A frame that has widths or opacities other than its layer's brings them on topic
-//!   `/hair/LAYER/look` (`pelage.HairLook`); files without such frames have no such topic. `log_time` is the time of the frame in nanoseconds since the first frame, `sequence` the
-//!   frame number. The facts of the shot are in the metadata record `pelage.shot`.
+//!   `/hair/LAYER/look` (`pelage.HairLook`); files without such frames have no such topic. `log_time` is the time of the
+//!   frame in nanoseconds since the first frame, `sequence` the frame number. The facts of the shot are in the metadata record `pelage.shot`.
 //! * [`read_hair_mcap`] reads such a file frame by frame, [`verify_layers`] and [`verify_frames`] compare it with what should be in it.
 //! * [`write_frame_payload`] and [`read_frame_payload`] hold the positions of one frame and nothing else.
 //! * [`write_state_payload`] and [`read_state_payload`] hold the state of a simulation.
