@@ -169,6 +169,7 @@ const OPERATORS: &[Shown] = &[
         ["splay = 0.0", "splay = 0.5", "splay = 1.0"],
     ),
     shown("clump.weave", Field, "density = 0.7\npercent = 0.8", ["weave = 0.0", "weave = 0.5", "weave = 2.0"]),
+    shown("clump.hold", Field, "density = 0.7\npercent = 1.0", ["hold = 0.1", "hold = 0.3", ""]),
     shown("clump.taper", Field, "density = 0.7\npercent = 1.0", ["taper = -0.7", "taper = 0.0", "taper = 0.7"]),
     shown(
         "clump.dilation",

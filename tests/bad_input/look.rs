@@ -51,6 +51,11 @@ fn clumps() {
         ("density = 1\nrate = 0.5\ndilation = { mean = [1, 1, 1, 1] }", ".rate|dilation|help:"),
         ("density = 1\ndilation = { mean = [1, 1, 1, -1] }", ".dilation|out of range"),
         ("density = 1\nwet = { width = -1 }", ".wet.width|out of range"),
+        (
+            "density = 1\nsimulate = true\npercent = [{ frame = 1, value = 1 }, { frame = 2, value = 0 }]",
+            ".percent|can't have key frames|rest shape|help:",
+        ),
+        ("density = 1\nhold = 0", ".hold|0 is out of range"),
         ("density = 1\nwet = { width = 1 }\nsimulate = true", ".wet|shape only|help:"),
         ("density = 1\nareas = [\"hose\"]", ".areas|no emitter `hose`|help:"),
         ("roots = []", "need finite points|help:"),

@@ -172,6 +172,7 @@ fn clump_of<'a>(
         splay: Param::constant(splay),
         weave: Param::constant(0.0),
         taper: 0.0,
+        hold: f32::INFINITY,
         dilation: &[],
         keep_length: false,
         id,

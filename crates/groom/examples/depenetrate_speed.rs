@@ -65,7 +65,7 @@ fn main() {
         for _ in 0..3 {
             let mut moved = all.clone();
             let start = Instant::now();
-            counts = depenetrate(&bvh, &settings, None, &offsets, [0.0; 3], &mut moved);
+            counts = depenetrate(&bvh, &settings, None, &offsets, [0.0; 3], None, &mut moved);
             times.push(start.elapsed().as_secs_f64());
         }
         let best = times.iter().copied().fold(f64::INFINITY, f64::min);

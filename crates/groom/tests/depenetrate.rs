@@ -74,7 +74,7 @@ impl Skin {
 
     fn run(&self, points: usize, position: &mut [[f32; 3]]) -> DepenetrateCounts {
         let offsets = Offsets::uniform(position.len() / points, points);
-        depenetrate(&self.bvh, &SETTINGS, None, &offsets, [0.0; 3], position)
+        depenetrate(&self.bvh, &SETTINGS, None, &offsets, [0.0; 3], None, position)
     }
 }
 
@@ -244,7 +244,7 @@ fn hair_on_a_skin_that_has_moved_is_moved_alike() {
     let (mut a, mut b) = (rest.clone(), moved.clone());
     let at_rest = skin.run(points, &mut a);
     let offsets = Offsets::uniform(200, points);
-    let then = depenetrate(&skin.bvh, &SETTINGS, Some(&motion), &offsets, origin, &mut b);
+    let then = depenetrate(&skin.bvh, &SETTINGS, Some(&motion), &offsets, origin, None, &mut b);
     assert_eq!((at_rest.pushed, 0), (then.pushed, then.uncleared));
     // Coordinates are stored relative to another point: what is rounded otherwise shows most in deep hair.
     let mut apart: Vec<f64> = a.iter().zip(&b).map(|(a, b)| (at(&carry(a)) - at(b)).norm()).collect();
@@ -275,13 +275,42 @@ fn what_cannot_be_cleared_is_counted_and_what_is_no_hair_is_left() {
     let offsets = Offsets::from_counts(lines.iter().map(Vec::len));
     let before = lines.concat();
     let mut after = before.clone();
-    let counts = depenetrate(&skin.bvh, &SETTINGS, None, &offsets, [0.0; 3], &mut after);
+    let counts = depenetrate(&skin.bvh, &SETTINGS, None, &offsets, [0.0; 3], None, &mut after);
     assert_eq!((counts.uncleared, counts.buried), (2, 2), "{counts:?}");
     let bits = |p: &[[f32; 3]]| p.iter().flatten().map(|x| x.to_bits()).collect::<Vec<_>>();
     assert_eq!(bits(&before[10..]), bits(&after[10..]));
     // The first is only inside where it has to be.
     assert_eq!(bits(&before[..5]), bits(&after[..5]));
     assert!(after[5..10].iter().flatten().all(|x| x.is_finite()) && counts.deepest[1] <= counts.deepest[0]);
-    let none = depenetrate(&Bvh::default(), &SETTINGS, None, &offsets, [0.0; 3], &mut after);
+    let none = depenetrate(&Bvh::default(), &SETTINGS, None, &offsets, [0.0; 3], None, &mut after);
     assert_eq!(none, DepenetrateCounts::default());
+}
+
+/// A hair that hangs beside a ball and is drawn through its middle, a little to this side and that from frame to frame.
+#[test]
+fn hair_stays_on_the_side_that_it_came_from() {
+    let skin = Skin::new(shapes::cube_sphere(24, 3.0));
+    let hair = |x: f64| {
+        vertices(
+            &(0..17).map(|k| Vec3::new(if k > 4 { x } else { 0.0 }, 7.0 - 0.6 * k as f64, 0.1)).collect::<Vec<_>>(),
+        )
+    };
+    let mut came = hair(3.4);
+    came[..5].copy_from_slice(&hair(0.0)[..5]);
+    let offsets = Offsets::uniform(1, 17);
+    let run = |frame: i32, from: Option<&[[f32; 3]]>| {
+        let mut out = hair(0.3 * libm::sin(2.0 * f64::from(frame)));
+        let counts = depenetrate(&skin.bvh, &SETTINGS, None, &offsets, [0.0; 3], from, &mut out);
+        assert_eq!((counts.pushed, counts.uncleared), (1, 0));
+        assert!(!any_sample(&out, 0.1, |p| skin.inside_by_parity(p)));
+        out
+    };
+    let jumps = |from: Option<&[[f32; 3]]>| {
+        let frames: Vec<_> = (0..12).map(|f| run(f, from)).collect();
+        let jump =
+            |w: &[Vec<[f32; 3]>]| w[0].iter().zip(&w[1]).map(|(p, q)| (at(p) - at(q)).norm()).fold(0.0, f64::max);
+        frames.windows(2).map(jump).fold(0.0, f64::max)
+    };
+    assert!(jumps(None) > 3.0, "by the nearest way out it changes sides: {}", jumps(None));
+    assert!(jumps(Some(&came)) < 1.0, "{}", jumps(Some(&came)));
 }

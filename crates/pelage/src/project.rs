@@ -346,6 +346,14 @@ fn check_overrides(shot: &Document<ShotFile>, groom: &Document<GroomFile>) -> Re
             let what = format!("layer {} has no level {} of clumps", o.layer, o.clump);
             return Err(shot.error(&format!("{at}.clump"), what, "levels are numbered from 0").into());
         }
+        if o.rate.is_some() && layer.clump[o.clump].dilation.is_some() {
+            let what = format!("the level has a dilation in {}, beside which no rate is read", groom.path.display());
+            return Err(shot.error(&format!("{at}.rate"), what, "take one of the two out").into());
+        }
+        if !layer.clump[o.clump].areas.is_empty() {
+            let what = format!("the level acts in the areas of emitters in {}", groom.path.display());
+            return Err(shot.error(&at, what, "key the emitter's percent and clump_rate").into());
+        }
         if o.percent.is_none() && o.rate.is_none() {
             return Err(shot.error(&at, "changes nothing", "give percent or rate, or take it out").into());
         }

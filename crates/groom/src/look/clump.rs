@@ -38,6 +38,9 @@ pub struct Clump<'a> {
     /// \[C\] size of the clump's cross-section at a quarter, half, three quarters of the hair and its tip, relative to that
     /// at the root (streamlines paper §4.5): replaces the rate. Empty: the formula.
     pub dilation: &'a [[f32; 4]],
+    /// Distance from the centre's line up to which it holds a hair, scene units; hair beyond it is held less, and at twice
+    /// the distance not at all, from there to the tip. Infinity: at any distance, as in the paper.
+    pub hold: f32,
     /// Keep the lengths of segments instead of the points where the formula puts them.
     pub keep_length: bool,
     /// \[N\] names of the hairs.
@@ -106,6 +109,9 @@ pub fn clump(points: usize, c: &Clump, line: &[[f32; 3]], position: &mut [[f32; 
                 delta.iter_mut().zip(&splay).for_each(|(x, s)| *x *= 1.0 - open * s);
             }
             let line = &line[own as usize * points..][..points];
+            if c.hold < f32::INFINITY {
+                hold(hair, line, c.hold, &mut delta);
+            }
             draw(hair, line, &delta);
             let weave = c.weave.of(h);
             if weave != 0.0 {
@@ -124,6 +130,16 @@ fn draw(hair: &mut [[f32; 3]], line: &[[f32; 3]], delta: &[f32]) {
     for ((p, q), &d) in hair.iter_mut().zip(line).zip(delta).skip(1) {
         // This form meets the centre at 1 without rounding.
         *p = std::array::from_fn(|x| p[x] * (1.0 - d) + q[x] * d);
+    }
+}
+
+/// Lessens `delta` where a hair is farther from its line than `reach`, and from there on.
+fn hold(hair: &[[f32; 3]], line: &[[f32; 3]], reach: f32, delta: &mut [f32]) {
+    let mut held = 1.0f32;
+    for ((p, q), delta) in hair.iter().zip(line).zip(delta) {
+        let beyond = ((V3::from(*p) - V3::from(*q)).norm() / reach - 1.0).clamp(0.0, 1.0);
+        held = held.min(1.0 - beyond * beyond * (3.0 - 2.0 * beyond));
+        *delta *= held;
     }
 }
 

@@ -38,6 +38,7 @@ impl Case {
             weave: Param::constant(0.0),
             taper: 0.0,
             dilation: &[],
+            hold: f32::INFINITY,
             keep_length: false,
             id: &self.id,
             seed: 3,
@@ -146,6 +147,21 @@ fn the_profile_of_a_clump_is_as_it_says() {
     let half = case.run(&Clump { percent: Param::constant(0.5), ..case.clump() });
     assert!((0..41).all(|k| (left(&weave, k) - left(&half, k)).abs() < 1e-4));
     assert!((0..41).any(|k| (double(weave[h * 41 + k]) - double(half[h * 41 + k])).norm() > 0.05));
+    // A hair that is held is drawn by less from once it is too far from the centre, and not at all from twice as far.
+    let reach = |k: usize| (double(case.position[h * 41 + k]) - case.towards(h, k).unwrap()).norm();
+    let farthest = (0..41).map(reach).fold(0.0, f64::max) as f32;
+    let hold = |hold: f32| case.run(&Clump { hold, ..case.clump() });
+    let own = h * 41..(h + 1) * 41;
+    assert!(hold(1.001 * farthest)[own.clone()] == plain[own]);
+    let loose = hold(0.4 * farthest);
+    let mut held = 1.0f64;
+    for k in 0..41 {
+        let beyond = (reach(k) / (0.4 * f64::from(farthest)) - 1.0).clamp(0.0, 1.0);
+        held = held.min(1.0 - beyond * beyond * (3.0 - 2.0 * beyond));
+        let expected = 1.0 - (1.0 - left(&plain, k)) * held;
+        assert!(reach(k) == 0.0 || (left(&loose, k) - expected).abs() < 1e-5, "{k}");
+    }
+    assert!(held == 0.0 && loose[h * 41 + 40] == case.position[h * 41 + 40]);
     // Dilation says the size of the cross-section at its stations.
     let sizes = vec![[0.8, 0.6, 0.3, 1.5]; 20];
     let dilated = case.run(&Clump { dilation: &sizes, ..case.clump() });

@@ -92,7 +92,7 @@ pub fn run(a: &DepenetrateArguments) -> Result<bool, Error> {
     let mut counts = DepenetrateCounts::default();
     for (layer, position) in source.layers.iter().zip(&mut source.position) {
         let origin = source.facts.origin;
-        counts = counts.and(depenetrate(&bvh, &settings, None, &layer.offsets, origin, position));
+        counts = counts.and(depenetrate(&bvh, &settings, None, &layer.offsets, origin, None, position));
     }
     if let (Some(out), Some(target)) = (&a.out, target) {
         if source.frames > 1 {

@@ -65,6 +65,9 @@ pub struct Clump {
     pub taper: f64,
     /// Sizes of the clump's cross-section along the hair instead of a rate.
     pub dilation: Option<Dilation>,
+    /// Distance from the centre up to which it holds a hair, scene units: hair that the motion takes farther leaves its
+    /// clump, gradually up to twice the distance, from there to its tip. Default: none, clumps reach any distance.
+    pub hold: Option<f64>,
     /// Keep the lengths of hairs instead of bringing their points exactly where the formula says. Default: false.
     #[serde(default)]
     pub keep_length: bool,

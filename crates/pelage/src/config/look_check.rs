@@ -20,6 +20,12 @@ impl Document<GroomFile> {
                 return Err(self.error(&format!("{at}.curl.per_clump"), "the layer has no clumps", help));
             }
         }
+        for (k, c) in l.clump.iter().enumerate().filter(|(_, c)| c.simulate) {
+            self.check_rest_shape(&format!("{at}.clump[{k}]"), &c.varied())?;
+        }
+        if let Some(c) = l.curl.as_ref().filter(|c| c.simulate) {
+            self.check_rest_shape(&format!("{at}.curl"), &c.varied())?;
+        }
         for (k, w) in l.wave.iter().enumerate() {
             let at = format!("{at}.wave[{k}]");
             for (axis, values) in [("x", w.x.values()), ("y", w.y.values())] {
@@ -70,6 +76,18 @@ impl Document<GroomFile> {
         Ok(())
     }
 
+    /// Parameters of what is handed to the simulation.
+    fn check_rest_shape(&self, at: &str, varied: &[Varied<'_>]) -> Result<(), ConfigError> {
+        match varied.iter().find(|v| v.value.0.value.0.len() > 1) {
+            None => Ok(()),
+            Some(v) => Err(self.error(
+                &format!("{at}.{}", v.name),
+                "can't have key frames: it makes the rest shape of the simulation",
+                "take the keys out, or `simulate`",
+            )),
+        }
+    }
+
     fn check_clump(&self, at: &str, level: usize, c: &Clump) -> Result<(), ConfigError> {
         let given = [c.density.is_some(), c.regions.is_some(), c.roots.is_some(), c.curves.is_some()];
         if given.iter().filter(|g| **g).count() != 1 {
@@ -106,6 +124,9 @@ impl Document<GroomFile> {
             ));
         }
         self.within(&format!("{at}.taper"), c.taper, -1.0, 1.0)?;
+        if let Some(hold) = c.hold {
+            self.within(&format!("{at}.hold"), hold, 1e-6, 1e9)?;
+        }
         if let Some(d) = &c.dilation {
             for x in d.mean.iter().chain(&d.deviation) {
                 self.within(&format!("{at}.dilation"), *x, 0.0, 1e3)?;

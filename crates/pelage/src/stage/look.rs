@@ -86,6 +86,8 @@ pub fn finish(
     let points = if last { run.project.points(i) } else { from };
     let (skin, pose) = (groom::skin(run)?, groom::pose(run, at)?);
     out.position = refined(out.position, from, points);
+    let collides = last && collides(run.project, i);
+    let came = if collides && !acting.is_empty() { Some(out.position.clone()) } else { None };
     if !acting.is_empty() {
         let look = prepared(run, what, &acting, points, &out.position)?;
         let roots = instance::roots(run, i)?;
@@ -100,8 +102,8 @@ pub fn finish(
             job.act(run, effect)?;
         }
     }
-    if last && collides(run.project, i) {
-        collide(run, i, at, &pose, &mut out.position, counts)?;
+    if collides {
+        collide(run, i, at, &pose, came.as_deref(), &mut out.position, counts)?;
     }
     Ok(out)
 }
@@ -113,12 +115,13 @@ pub struct Barrier {
     rest: Bvh,
 }
 
-/// Pushes finished hairs out of the skin.
+/// Pushes finished hairs out of the skin, to the side that they came `from` before they were displaced.
 fn collide(
     run: &mut Runner<'_>,
     i: usize,
     at: &SkinAt,
     pose: &SkinPose,
+    from: Option<&[[f32; 3]]>,
     position: &mut [[f32; 3]],
     counts: &mut Counts,
 ) -> Result<(), Error> {
@@ -145,7 +148,7 @@ fn collide(
     let settings = Depenetrate { step: millimetre, clearance: c.clearance * millimetre, held: c.held * millimetre };
     let points = run.project.points(i);
     let offsets = Offsets::uniform(position.len() / points, points);
-    let found = depenetrate(bvh, &settings, motion, &offsets, skin.origin(), position);
+    let found = depenetrate(bvh, &settings, motion, &offsets, skin.origin(), from, position);
     counts.insert("hairs pushed out of the skin".to_owned(), found.pushed as u64);
     counts.insert("hairs still in the skin".to_owned(), found.uncleared as u64);
     Ok(())
@@ -419,6 +422,7 @@ impl<'a> Job<'a, '_> {
             weave,
             taper: c.taper as f32,
             dilation: dilation.as_deref().unwrap_or_default(),
+            hold: c.hold.map_or(f32::INFINITY, |x| x as f32),
             keep_length: c.keep_length,
             id: &self.roots.id,
             seed: seed ^ rng::channel(&effect.key()),

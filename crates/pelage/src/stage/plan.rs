@@ -87,7 +87,7 @@ pub(super) mod version {
     pub const INTERPOLATE: u32 = 1;
     pub const CLUMP: u32 = 1;
     pub const LOOK: u32 = 1;
-    pub const COLLISION: u32 = 1;
+    pub const COLLISION: u32 = 2;
     pub const AREAS: u32 = 1;
     pub const EXPORT: u32 = 1;
     pub const PREVIEW: u32 = 2;

@@ -332,6 +332,7 @@ impl Reader<'_> {
                 let c = &layer.clump[k];
                 add("taper", &c.taper);
                 add("keep_length", &c.keep_length);
+                c.hold.iter().for_each(|x| add("hold", x));
                 if let Some(d) = &c.dilation {
                     add("dilation.mean", &format!("{:?}", d.mean));
                     add("dilation.deviation", &format!("{:?}", d.deviation));
