@@ -3,6 +3,7 @@
 mod document;
 mod groom;
 mod keyed;
+mod light;
 mod look;
 mod look_check;
 mod look_value;
@@ -15,6 +16,7 @@ pub use groom::{
     Placement,
 };
 pub use groom::{Side, Space, WidthFeature, WrapMode};
+pub use light::{Light, LightKind, Shadow, ShadowQuality};
 pub use keyed::{Amount, Key, Keyed, Vector};
 pub use look::{
     Clump, ClumpOf, Collision, Curl, CurlKind, CurlWave, Dilation, Emitter, Noise, Operator, Wave, WaveAxis, WaveShape,

@@ -2,6 +2,7 @@
 
 use super::document::{ConfigError, Document, exactly};
 use super::keyed::Keyed;
+use super::light::{Light, Shadow};
 use super::look::Operator;
 use super::simulate::{Simulate, Target};
 use schemars::JsonSchema;
@@ -24,6 +25,12 @@ pub struct ShotFile {
     /// What this shot changes of the groom's look.
     #[serde(default)]
     pub look: Look,
+    /// Lights, by which shadows are made for files and pictures.
+    #[serde(default)]
+    pub light: Vec<Light>,
+    /// How shadows are made.
+    #[serde(default)]
+    pub shadow: Shadow,
     /// Files to write.
     #[serde(default)]
     pub export: Export,

@@ -1,0 +1,186 @@
+//! Lights of a shot, and how well their shadows are known: `[[light]]` and `[shadow]`.
+
+use super::document::{ConfigError, Document, exactly};
+use super::keyed::{Keyed, Vector};
+use super::shot::ShotFile;
+use schemars::JsonSchema;
+use serde::{Deserialize, Deserializer};
+
+/// A light.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Light {
+    /// Name, in the columns of exported files: letters, digits, `_` and `-`.
+    pub name: String,
+    /// What it is.
+    pub kind: LightKind,
+    /// The way the light travels, along the scene's axes: three numbers, or key frames. Directional lights and spots.
+    pub direction: Option<Keyed<Vector>>,
+    /// Where it is, scene units: three numbers, or key frames. Points and spots.
+    pub position: Option<Keyed<Vector>>,
+    /// Angle between a spot's axis and its border, degrees: a number, or key frames. Default: 30.
+    pub cone: Option<Keyed<f64>>,
+    /// Part of a spot's cone over which it fades to the border, 0 to 1. Default: 0.2.
+    pub softness: Option<f64>,
+    /// Brightness: a number, or key frames. It weighs the light among the others and draws the preview; transmittance does
+    /// not depend on it. Default: 1.
+    #[serde(default = "one")]
+    pub intensity: Keyed<f64>,
+    /// Linear colour. Default: white.
+    #[serde(default = "white", deserialize_with = "exactly")]
+    pub color: [f64; 3],
+    /// First and last frame at which it is on. Default: always.
+    #[serde(default, deserialize_with = "some_frames")]
+    pub frames: Option<[i32; 2]>,
+    /// Write its column. Default: true. A light that no file and no picture uses costs nothing.
+    #[serde(default = "yes")]
+    pub export: bool,
+}
+
+fn one() -> Keyed<f64> {
+    Keyed::constant(1.0)
+}
+
+fn white() -> [f64; 3] {
+    [1.0; 3]
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn some_frames<'de, D: Deserializer<'de>>(d: D) -> Result<Option<[i32; 2]>, D::Error> {
+    exactly(d).map(Some)
+}
+
+/// What a light is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum LightKind {
+    /// Parallel light, as from the sun.
+    Directional,
+    /// From a point to all sides.
+    Point,
+    /// From a point into a cone.
+    Spot,
+}
+
+impl Light {
+    /// True if it is on at a frame.
+    pub fn is_on(&self, frame: i32) -> bool {
+        self.frames.is_none_or(|[a, b]| (a..=b).contains(&frame))
+    }
+}
+
+/// How shadows are made.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Shadow {
+    /// How well: settings of measured error. Default: "default".
+    pub quality: Option<ShadowQuality>,
+    /// Instead: the error of transmittance that is wanted (root mean square), from which the tool takes the cheapest settings
+    /// that it has measured to reach it.
+    pub error: Option<f64>,
+}
+
+/// Settings of shadows by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum ShadowQuality {
+    /// For a first look.
+    Draft,
+    /// Where the measured curve of error against time bends.
+    #[default]
+    Default,
+    /// A quarter of the default's texels, for close-ups.
+    Fine,
+    /// By rays against every hair: exact, and hundreds of times slower.
+    Reference,
+}
+
+impl Document<ShotFile> {
+    /// Checks lights.
+    pub(super) fn check_lights(&self) -> Result<(), ConfigError> {
+        for (i, l) in self.value.light.iter().enumerate() {
+            let at = format!("light[{i}]");
+            self.check_light(&at, l)?;
+            if self.value.light[..i].iter().any(|o| o.name.eq_ignore_ascii_case(&l.name)) {
+                return Err(self.error(&format!("{at}.name"), "is used twice", "name every light differently"));
+            }
+        }
+        let s = &self.value.shadow;
+        if let Some(error) = s.error {
+            if !(1e-4..=1.0).contains(&error) {
+                let what = format!("{error} is out of range");
+                return Err(self.error("shadow.error", what, "it is an error of a fraction: 0.0001 to 1"));
+            }
+            if s.quality.is_some() {
+                return Err(self.error("shadow.error", "stands beside `quality`", "keep one of the two"));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_light(&self, at: &str, l: &Light) -> Result<(), ConfigError> {
+        let name = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+        if l.name.is_empty() || !l.name.chars().all(name) {
+            let help = "use letters, digits, `_` and `-`: it names columns of files";
+            return Err(self.error(&format!("{at}.name"), "can't be the name of a column", help));
+        }
+        let (directed, placed, spot) = match l.kind {
+            LightKind::Directional => (true, false, false),
+            LightKind::Point => (false, true, false),
+            LightKind::Spot => (true, true, true),
+        };
+        for (key, has, wanted) in [
+            ("direction", l.direction.is_some(), directed),
+            ("position", l.position.is_some(), placed),
+            ("cone", l.cone.is_some(), spot && l.cone.is_some()),
+            ("softness", l.softness.is_some(), spot && l.softness.is_some()),
+        ] {
+            if has && !wanted {
+                return Err(self.error(&format!("{at}.{key}"), "is not read for this kind of light", "take it out"));
+            }
+            if wanted && !has {
+                return Err(self.error(at, format!("this kind of light needs `{key}`"), "three numbers, or key frames"));
+            }
+        }
+        for (key, keyed) in [("direction", &l.direction), ("position", &l.position)] {
+            let Some(keyed) = keyed else { continue };
+            let fine = |v: &Vector| v.0.iter().all(|x| x.abs() <= 1e18) && (key == "position" || v.0 != [0.0; 3]);
+            if !keyed.0.iter().all(|k| fine(&k.value)) {
+                let what = if key == "position" { "must be finite numbers" } else { "must be a direction" };
+                return Err(self.error(&format!("{at}.{key}"), what, "for example [0.0, -1.0, 0.0]"));
+            }
+            self.check_keys(&format!("{at}.{key}"), keyed)?;
+        }
+        for (key, keyed, most) in [("cone", l.cone.as_ref(), 90.0), ("intensity", Some(&l.intensity), 1e9)] {
+            let Some(keyed) = keyed else { continue };
+            let least = if key == "cone" { 0.01 } else { 0.0 };
+            for k in &keyed.0 {
+                self.light_value(&format!("{at}.{key}"), k.value, least, most)?;
+            }
+            self.check_keys(&format!("{at}.{key}"), keyed)?;
+        }
+        self.light_value(&format!("{at}.softness"), l.softness.unwrap_or(0.0), 0.0, 1.0)?;
+        l.color.iter().try_for_each(|c| self.light_value(&format!("{at}.color"), *c, 0.0, 1e6))?;
+        if l.frames.is_some_and(|[a, b]| a > b) {
+            return Err(self.error(&format!("{at}.frames"), "the last frame comes before the first", "first, last"));
+        }
+        Ok(())
+    }
+
+    fn check_keys<T>(&self, at: &str, keyed: &Keyed<T>) -> Result<(), ConfigError> {
+        if keyed.in_order() && keyed.0.iter().all(|k| k.frame.is_finite()) {
+            return Ok(());
+        }
+        Err(self.error(at, "key frames are not in order", "write one or more, each after the one before"))
+    }
+
+    fn light_value(&self, at: &str, x: f64, least: f64, most: f64) -> Result<(), ConfigError> {
+        if (least..=most).contains(&x) {
+            return Ok(());
+        }
+        Err(self.error(at, format!("{x} is out of range"), format!("from {least} to {most}")))
+    }
+}
