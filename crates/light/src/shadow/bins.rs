@@ -1,6 +1,7 @@
 //! Segments sorted into the tiles they touch.
 
 use super::project::{Place, Projection};
+use super::volume::thickness;
 use super::{ShadowHair, TILE};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -16,11 +17,14 @@ const CROWDED: usize = 64;
 /// Marks points whose value this map gives.
 const RECEIVES: u32 = 1 << 31;
 
-/// A point on the light's plane; x is not a number where the map has no place for it.
+/// A point on the light's plane; x is not a number where the map has no place for it. With it, what the segment to the
+/// next point takes of the light: see [`Segment`]; 0 where there is none.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Point {
     pub at: [f32; 3],
     strand: u32,
+    width: f32,
+    thickness: f32,
 }
 
 impl Point {
@@ -59,7 +63,8 @@ pub(crate) struct Segment {
     pub b: [f32; 3],
     /// Width in texels.
     pub width: f32,
-    pub opacity: f32,
+    /// Optical depth per area covered.
+    pub thickness: f32,
 }
 
 impl Chunk {
@@ -69,7 +74,7 @@ impl Chunk {
     }
 
     pub fn bytes(&self) -> usize {
-        16 * self.point.len() + 4 * (self.start.len() + self.list.len() + self.masked.len())
+        24 * self.point.len() + 4 * (self.start.len() + self.list.len() + self.masked.len())
     }
 
     /// Strand in the layer of point `k` of the chunk.
@@ -77,28 +82,46 @@ impl Chunk {
         self.point[k].strand() as usize - self.strand_shift
     }
 
-    /// The segment from point `k` of the chunk to the next, if it casts shadow here.
+    /// Where the segment from point `k` of the chunk to the next lies, if there is one and this map sees some of it.
     #[inline]
-    pub fn segment(&self, k: usize, layer: &ShadowHair, projection: &Projection) -> Option<Segment> {
+    fn ends(&self, k: usize, layer: &ShadowHair, projection: &Projection) -> Option<[[f32; 3]; 2]> {
         let (p, n) = (self.point[k], self.point.get(k + 1)?);
         if p.strand() != n.strand() {
             return None;
         }
-        let i = self.first + k;
-        let width = 0.5 * (layer.width(i) + layer.width(i + 1));
-        let s = self.layer_strand(k);
-        let opacity = 0.5 * (layer.opacity(s, i) + layer.opacity(s, i + 1));
-        if !(width * opacity > 0.0) {
+        if p.at[0].is_nan() || n.at[0].is_nan() {
+            let i = self.first + k;
+            return projection.clip_points(layer.point(i), layer.point(i + 1));
+        }
+        Some([p.at, n.at])
+    }
+
+    /// The segment from point `k` of the chunk to the next, if it casts shadow here.
+    #[inline]
+    pub fn segment(&self, k: usize, layer: &ShadowHair, projection: &Projection) -> Option<Segment> {
+        let Point { width, thickness, .. } = self.point[k];
+        if width == 0.0 {
             return None;
         }
-        let [a, b] = if p.at[0].is_nan() || n.at[0].is_nan() {
-            projection.clip_points(layer.point(i), layer.point(i + 1))?
-        } else {
-            [p.at, n.at]
-        };
-        let depth = 0.5 * (a[2] + b[2]);
-        let width = width * projection.per_unit(depth) * projection.stretch(&a, &b);
-        Some(Segment { a, b, width, opacity })
+        let [a, b] = self.ends(k, layer, projection)?;
+        Some(Segment { a, b, width, thickness })
+    }
+
+    /// Fills in what the segments take of the light.
+    fn weigh(&mut self, layer: &ShadowHair, projection: &Projection) {
+        for k in 0..self.point.len() {
+            let i = self.first + k;
+            let s = self.layer_strand(k);
+            let Some([a, b]) = self.ends(k, layer, projection) else { continue };
+            let width = 0.5 * (layer.width(i) + layer.width(i + 1));
+            let opacity = 0.5 * (layer.opacity(s, i) + layer.opacity(s, i + 1));
+            let width = width * projection.per_unit(0.5 * (a[2] + b[2])) * projection.stretch(&a, &b);
+            if opacity > 0.0 && width > 0.0 && width < f32::MAX {
+                self.point[k].width = width;
+                self.point[k].thickness = thickness(width, opacity);
+                self.segments += 1;
+            }
+        }
     }
 }
 
@@ -136,7 +159,8 @@ fn try_chunks(projection: &Projection, layers: &[ShadowHair], room: usize) -> Op
         .into_par_iter()
         .map(|(l, strands, shift)| {
             let mut chunk = place(projection, &layers[l], l, strands, shift);
-            let touched = touched(&mut chunk, projection, &layers[l], grid);
+            chunk.weigh(&layers[l], projection);
+            let touched = touched(&chunk, projection, &layers[l], grid);
             (chunk, touched)
         })
         .collect();
@@ -207,22 +231,21 @@ fn place(
                 }
             };
             chunk.receivers += usize::from(receives);
-            chunk.point.push(Point { at, strand: name | if receives { RECEIVES } else { 0 } });
+            let strand = name | if receives { RECEIVES } else { 0 };
+            chunk.point.push(Point { at, strand, width: 0.0, thickness: 0.0 });
         }
     }
     chunk
 }
 
 /// The tiles that each point of a chunk, or the segment that begins there, touches.
-fn touched(chunk: &mut Chunk, projection: &Projection, layer: &ShadowHair, grid: usize) -> Vec<Tiles> {
+fn touched(chunk: &Chunk, projection: &Projection, layer: &ShadowHair, grid: usize) -> Vec<Tiles> {
     let border = projection.border() as f32;
     let side = grid as f32;
-    let mut segments = 0;
-    let tiles = (0..chunk.point.len())
+    (0..chunk.point.len())
         .map(|k| {
             let p = chunk.point[k];
             let segment = chunk.segment(k, layer, projection);
-            segments += usize::from(segment.is_some());
             let (lo, hi) = match &segment {
                 Some(s) => {
                     let pad = 0.5 * s.width + border;
@@ -239,9 +262,7 @@ fn touched(chunk: &mut Chunk, projection: &Projection, layer: &ShadowHair, grid:
             let into = |v: f32| v.clamp(0.0, side - 1.0) as u16;
             Tiles([into(lo[0]), into(hi[0]), into(lo[1]), into(hi[1])])
         })
-        .collect();
-    chunk.segments = segments;
-    tiles
+        .collect()
 }
 
 /// Fills the lists by tile: a counting sort, in order of the points.

@@ -3,7 +3,7 @@
 //! The method is Kim's (opacity shadow maps, SIGGRAPH 2003 course notes, §4) cut into tiles: the plane across the light
 //! is divided into squares of [`TILE`] texels, the hair segments are sorted into them, and each tile sums optical depth
 //! into slices of its own, samples its own points and is forgotten. Tiles are independent, so the bytes are the same
-//! for any number of threads, and memory is 16 bytes a point, about 6 a segment and one tile a thread, whatever
+//! for any number of threads, and memory is 24 bytes a point, about 6 a segment and one tile a thread, whatever
 //! the resolution times the slices.
 //!
 //! Transmittance is the fraction of light that passes all *other* hairs and all solids: a hair of opacity o that lies

@@ -182,17 +182,18 @@ impl<'a> Work<'a> {
         for s in entry.iter().filter_map(|e| e.segment.as_ref()) {
             let start = self.fragment.len();
             let (mut low, mut high) = ([i32::MAX; 2], [i32::MIN; 2]);
-            fragments(s, self.volume.side, self.settings.slices, |f| {
-                low = [low[0].min(f.x), low[1].min(f.y)];
-                high = [high[0].max(f.x), high[1].max(f.y)];
-                self.fragment.push(f);
+            fragments(s, self.volume.side, self.settings.slices, |x, y, layer, depth| {
+                low = [low[0].min(x), low[1].min(y)];
+                high = [high[0].max(x), high[1].max(y)];
+                self.fragment.push(Fragment { x: x as i16, y: y as i16, layer: layer as i16, depth });
             });
             self.run.push(Run { fragments: start..self.fragment.len(), low, high });
         }
         for (layer, point, at) in entry.iter().filter_map(|e| e.receiver) {
             let window = Window::new(at[0], at[1], self.projection.filter);
-            let (plane, _) = self.volume.plane(at[2]);
-            self.own.clear(&window);
+            let (plane, f) = self.volume.plane(at[2]);
+            let interpolation = self.settings.interpolation;
+            self.own.clear(&window, interpolation);
             for r in &self.run {
                 let apart = r.low[0] >= window.x + window.across as i32
                     || r.low[1] >= window.y + window.down as i32
@@ -201,11 +202,10 @@ impl<'a> Work<'a> {
                 if apart {
                     continue;
                 }
-                for f in &self.fragment[r.fragments.clone()] {
-                    self.own.add(&window, f, plane as i32);
-                }
+                let own = &self.fragment[r.fragments.clone()];
+                self.own.add(&window, own, plane as i32, f, interpolation);
             }
-            let light = self.volume.sample(&window, at[2], Some(&self.own), self.settings.interpolation);
+            let light = self.volume.sample(&window, at[2], &self.own, interpolation);
             cells[layer as usize][point as usize].store(light.to_bits(), Ordering::Relaxed);
         }
     }
