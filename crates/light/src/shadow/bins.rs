@@ -1,7 +1,7 @@
 //! Segments sorted into the tiles they touch.
 
 use super::project::{Place, Projection};
-use super::volume::thickness;
+use super::line::thickness;
 use super::{ShadowHair, TILE};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -29,11 +29,24 @@ pub(crate) struct Point {
 
 impl Point {
     pub fn strand(&self) -> u32 {
-        self.strand & !RECEIVES
+        Point::strand_of(self.strand)
     }
 
     pub fn receives(&self) -> bool {
-        self.strand & RECEIVES != 0
+        Point::receives_of(self.strand)
+    }
+
+    pub fn strand_of(word: u32) -> u32 {
+        word & !RECEIVES
+    }
+
+    pub fn receives_of(word: u32) -> bool {
+        word & RECEIVES != 0
+    }
+
+    /// Both in one word, to be read ahead.
+    pub fn word(&self) -> u32 {
+        self.strand
     }
 }
 

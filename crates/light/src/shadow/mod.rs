@@ -12,6 +12,7 @@
 mod bins;
 mod exact;
 mod exp;
+mod line;
 mod project;
 mod settings;
 mod solid;

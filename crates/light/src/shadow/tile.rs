@@ -1,9 +1,10 @@
 //! One tile of a map: fills its volume, samples its points.
 
-use super::bins::{Chunk, Segment};
+use super::bins::{Chunk, Point, Segment};
+use super::line::Line;
 use super::project::Projection;
 use super::settings::{Placement, ShadowSettings};
-use super::volume::{Fragment, Own, Volume, Window, fragments};
+use super::volume::{Own, Volume, Window};
 use super::{ShadowHair, TILE};
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -14,31 +15,34 @@ const BINS: usize = 256;
 /// one slice.
 const EVEN: f32 = 0.25;
 
+/// Points that are read ahead of their use: lists jump about in memory, and loads that do not wait for each other
+/// overlap.
+const AHEAD: usize = 64;
+
 /// What one thread needs for its tiles.
 pub(crate) struct Work<'a> {
     projection: &'a Projection,
     settings: &'a ShadowSettings,
     volume: Volume,
-    entry: Vec<Entry>,
+    segment: Vec<Cast>,
+    receiver: Vec<Receiver>,
+    line: Vec<Line>,
     warp: Vec<f32>,
     own: Own,
-    fragment: Vec<Fragment>,
-    run: Vec<Run>,
 }
 
-/// A point of the tile's list with the segment that begins there.
-struct Entry {
-    segment: Option<Segment>,
+/// A segment in texels of the volume and the strand it is of.
+struct Cast {
+    segment: Segment,
     strand: u32,
-    /// Layer and point in it, and where it is in the volume; for points whose value this tile gives.
-    receiver: Option<(u32, u32, [f32; 3])>,
 }
 
-/// Fragments of one segment and the texels they lie in.
-struct Run {
-    fragments: std::ops::Range<usize>,
-    low: [i32; 2],
-    high: [i32; 2],
+/// A point whose value the tile gives.
+struct Receiver {
+    at: [f32; 3],
+    strand: u32,
+    layer: u32,
+    point: u32,
 }
 
 impl<'a> Work<'a> {
@@ -47,11 +51,11 @@ impl<'a> Work<'a> {
             projection,
             settings,
             volume: Volume::new(projection.filter, settings.slices),
-            entry: Vec::new(),
+            segment: Vec::new(),
+            receiver: Vec::new(),
+            line: Vec::new(),
             warp: Vec::new(),
             own: Own::new(),
-            fragment: Vec::new(),
-            run: Vec::new(),
         }
     }
 
@@ -67,20 +71,40 @@ impl<'a> Work<'a> {
         let Some([from, to]) = self.gather(chunks, layers, place, t) else { return false };
         self.place_slices(from, to);
         self.volume.clear();
-        for e in &self.entry {
-            if let Some(s) = &e.segment {
-                self.volume.splat(s);
+        self.line.clear();
+        // Segments and receivers are in the same order of strands.
+        let (mut s, mut r) = (0, 0);
+        let mut runs = Vec::new();
+        while r < self.receiver.len() {
+            let strand = self.receiver[r].strand;
+            let first = r;
+            while r < self.receiver.len() && self.receiver[r].strand == strand {
+                r += 1;
             }
+            self.fill(&mut s, |other| other < strand);
+            let line = self.line.len();
+            self.fill(&mut s, |other| other == strand);
+            runs.push((first..r, line..self.line.len()));
         }
+        self.fill(&mut s, |_| true);
         self.volume.sum();
-        let mut first = 0;
-        while first < self.entry.len() {
-            let strand = self.entry[first].strand;
-            let count = self.entry[first..].iter().take_while(|e| e.strand == strand).count();
-            self.receive(first..first + count, cells);
-            first += count;
+        for (receivers, lines) in runs {
+            self.receive(receivers, lines, cells);
         }
         true
+    }
+
+    /// Puts segments from `next` on into the volume while their strand is of a kind.
+    fn fill(&mut self, next: &mut usize, of: impl Fn(u32) -> bool) {
+        while let Some(own) = self.segment.get(*next)
+            && of(own.strand)
+        {
+            Line::of(&own.segment, self.volume.side(), self.settings.slices, |l| {
+                self.volume.add(&l);
+                self.line.push(l);
+            });
+            *next += 1;
+        }
     }
 
     /// Lists what the tile has, in texels of the volume; the depths of its first and last receiver.
@@ -91,30 +115,37 @@ impl<'a> Work<'a> {
         place: [usize; 2],
         t: usize,
     ) -> Option<[f32; 2]> {
-        self.entry.clear();
+        self.segment.clear();
+        self.receiver.clear();
         let border = self.projection.border() as f32;
         let low = place.map(|v| (v * TILE) as f32 - border);
         let (mut from, mut to) = (f32::INFINITY, f32::NEG_INFINITY);
         let shift = |p: [f32; 3]| [p[0] - low[0], p[1] - low[1], p[2]];
         let top = self.projection.texels as f32 - 0.001;
+        let mut word = [0u32; AHEAD];
         for chunk in chunks {
-            for &k in chunk.tile(t) {
-                let k = k as usize;
-                let p = &chunk.point[k];
-                let mut receiver = None;
-                if p.receives() {
-                    let inside = |i: usize| (p.at[i].clamp(0.0, top) * (1.0 / TILE as f32)) as usize == place[i];
-                    if inside(0) && inside(1) {
-                        from = from.min(p.at[2]);
-                        to = to.max(p.at[2]);
-                        let at = shift([p.at[0].clamp(0.0, top), p.at[1].clamp(0.0, top), p.at[2]]);
-                        receiver = Some((chunk.layer as u32, (chunk.first + k) as u32, at));
+            for list in chunk.tile(t).chunks(AHEAD) {
+                for (w, &k) in word.iter_mut().zip(list) {
+                    *w = chunk.point[k as usize].word();
+                }
+                for (&w, &k) in word.iter().zip(list) {
+                    let k = k as usize;
+                    let strand = Point::strand_of(w);
+                    if Point::receives_of(w) {
+                        let p = chunk.point[k].at;
+                        let p = [p[0].clamp(0.0, top), p[1].clamp(0.0, top), p[2]];
+                        let inside = |i: usize| (p[i] * (1.0 / TILE as f32)) as usize == place[i];
+                        if inside(0) && inside(1) {
+                            from = from.min(p[2]);
+                            to = to.max(p[2]);
+                            let point = (chunk.first + k) as u32;
+                            self.receiver.push(Receiver { at: shift(p), strand, layer: chunk.layer as u32, point });
+                        }
+                    }
+                    if let Some(s) = chunk.segment(k, &layers[chunk.layer], self.projection) {
+                        self.segment.push(Cast { segment: Segment { a: shift(s.a), b: shift(s.b), ..s }, strand });
                     }
                 }
-                let segment = chunk
-                    .segment(k, &layers[chunk.layer], self.projection)
-                    .map(|s| Segment { a: shift(s.a), b: shift(s.b), ..s });
-                self.entry.push(Entry { segment, strand: p.strand(), receiver });
             }
         }
         (from <= to).then_some([from, to])
@@ -131,7 +162,7 @@ impl<'a> Work<'a> {
             Placement::Uniform => self.warp.extend((0..=BINS).map(|b| b as f32 * slices / BINS as f32)),
             Placement::Histogram => {
                 let mut count = [0u32; BINS];
-                for s in self.entry.iter().filter_map(|e| e.segment.as_ref()) {
+                for Cast { segment: s, .. } in &self.segment {
                     let b = (0.5 * (s.a[2] + s.b[2]) - from) * scale;
                     if b >= 0.0 && b < BINS as f32 {
                         count[b as usize] += 1;
@@ -160,53 +191,32 @@ impl<'a> Work<'a> {
                 warp[i] + (warp[i + 1] - warp[i]) * (b - i as f32)
             }
         };
-        for e in &mut self.entry {
-            if let Some(s) = &mut e.segment {
-                s.a[2] = at(s.a[2]);
-                s.b[2] = at(s.b[2]);
-            }
-            if let Some((_, _, p)) = &mut e.receiver {
-                p[2] = at(p[2]);
-            }
+        for Cast { segment: s, .. } in &mut self.segment {
+            s.a[2] = at(s.a[2]);
+            s.b[2] = at(s.b[2]);
+        }
+        for r in &mut self.receiver {
+            r.at[2] = at(r.at[2]);
         }
     }
 
-    /// Gives the points of one strand their values.
-    fn receive(&mut self, entries: std::ops::Range<usize>, cells: &[Vec<AtomicU32>]) {
-        let entry = &self.entry[entries];
-        if entry.iter().all(|e| e.receiver.is_none()) {
-            return;
-        }
-        self.fragment.clear();
-        self.run.clear();
-        for s in entry.iter().filter_map(|e| e.segment.as_ref()) {
-            let start = self.fragment.len();
-            let (mut low, mut high) = ([i32::MAX; 2], [i32::MIN; 2]);
-            fragments(s, self.volume.side, self.settings.slices, |x, y, layer, depth| {
-                low = [low[0].min(x), low[1].min(y)];
-                high = [high[0].max(x), high[1].max(y)];
-                self.fragment.push(Fragment { x: x as i16, y: y as i16, layer: layer as i16, depth });
-            });
-            self.run.push(Run { fragments: start..self.fragment.len(), low, high });
-        }
-        for (layer, point, at) in entry.iter().filter_map(|e| e.receiver) {
-            let window = Window::new(at[0], at[1], self.projection.filter);
-            let (plane, f) = self.volume.plane(at[2]);
-            let interpolation = self.settings.interpolation;
+    /// Gives points of one strand their values.
+    fn receive(
+        &mut self,
+        receivers: std::ops::Range<usize>,
+        lines: std::ops::Range<usize>,
+        cells: &[Vec<AtomicU32>],
+    ) {
+        let interpolation = self.settings.interpolation;
+        for r in &self.receiver[receivers] {
+            let window = Window::new(r.at[0], r.at[1], self.projection.filter);
+            let (plane, f) = self.volume.plane(r.at[2]);
             self.own.clear(&window, interpolation);
-            for r in &self.run {
-                let apart = r.low[0] >= window.x + window.across as i32
-                    || r.low[1] >= window.y + window.down as i32
-                    || r.high[0] < window.x
-                    || r.high[1] < window.y;
-                if apart {
-                    continue;
-                }
-                let own = &self.fragment[r.fragments.clone()];
-                self.own.add(&window, own, plane as i32, f, interpolation);
+            for line in &self.line[lines.clone()] {
+                self.own.add(&window, line, plane as i32, f, interpolation);
             }
-            let light = self.volume.sample(&window, at[2], &self.own, interpolation);
-            cells[layer as usize][point as usize].store(light.to_bits(), Ordering::Relaxed);
+            let light = self.volume.sample(&window, r.at[2], &self.own, interpolation);
+            cells[r.layer as usize][r.point as usize].store(light.to_bits(), Ordering::Relaxed);
         }
     }
 }

@@ -1,23 +1,10 @@
 //! Optical depth of one tile in slices.
 
 use super::TILE;
-use super::bins::Segment;
 use super::exp::exp_neg;
+use super::line::Line;
 use super::settings::Interpolation;
 use wide::f32x4;
-
-/// Widest part of a line that is drawn as one, texels: the line has no width then, and its mass lands up to half of this
-/// beside where it belongs. Wider segments are drawn as several lines side by side.
-const LINE: f32 = 0.3;
-
-/// Pieces of a line per texel. With 1 the error of the default grows by a tenth; more change nothing.
-const PIECES: f32 = 2.0;
-
-/// Most lines of one segment.
-const LINES: f32 = 128.0;
-
-/// Opacity that counts as opaque: optical depth 11.5, light 1e-5.
-const OPAQUE: f32 = 0.99999;
 
 /// Taps of the widest filter along a side, a multiple of 4.
 pub(crate) const TAPS: usize = 20;
@@ -26,7 +13,7 @@ pub(crate) const TAPS: usize = 20;
 /// k, and the last one what lies beyond the last plane. After [`Volume::sum`] layer k is what lies before plane k.
 pub(crate) struct Volume {
     /// Texels along a side, with the border.
-    pub side: usize,
+    side: usize,
     stride: usize,
     slices: usize,
     depth: Vec<f32>,
@@ -39,15 +26,6 @@ pub(crate) struct Window {
     pub across: usize,
     pub down: usize,
     weight: [[f32; TAPS]; 2],
-}
-
-/// Part of a hair in one texel of one layer.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Fragment {
-    pub x: i16,
-    pub y: i16,
-    pub layer: i16,
-    pub depth: f32,
 }
 
 impl Window {
@@ -72,6 +50,13 @@ impl Window {
         }
         w
     }
+
+    /// Its texels as a box.
+    #[inline]
+    fn bounds(&self) -> ([f32; 2], [f32; 2]) {
+        let low = [self.x as f32, self.y as f32];
+        (low, [low[0] + self.across as f32, low[1] + self.down as f32])
+    }
 }
 
 /// Optical depth that the hair itself puts into the window of one of its points, for the planes that are interpolated.
@@ -92,32 +77,29 @@ impl Own {
         }
     }
 
-    /// Adds fragments of the hair for a point at `f` between planes `plane` and `plane` + 1. What is outside the window
+    /// Adds a line of the hair for a point at `f` between planes `plane` and `plane` + 1. What is outside the window
     /// goes to where no weight is.
     #[inline]
-    pub fn add(&mut self, window: &Window, fragments: &[Fragment], plane: i32, f: f32, interpolation: Interpolation) {
-        let place = |g: &Fragment| {
-            let x = ((i32::from(g.x) - window.x) as u32).min(window.across as u32) as usize;
-            let y = ((i32::from(g.y) - window.y) as u32).min(window.down as u32) as usize;
+    pub fn add(&mut self, window: &Window, line: &Line, plane: i32, f: f32, interpolation: Interpolation) {
+        let (low, high) = window.bounds();
+        let place = |p: [i32; 3]| {
+            let x = ((p[0] - window.x) as u32).min(window.across as u32) as usize;
+            let y = ((p[1] - window.y) as u32).min(window.down as u32) as usize;
             (x, y)
         };
-        if interpolation == Interpolation::OpticalDepth {
-            let [own, ..] = &mut self.0;
-            for g in fragments {
-                let (x, y) = place(g);
-                let layer = i32::from(g.layer);
-                let seen = if layer <= plane { 1.0 } else { f };
-                let seen = if layer <= plane + 1 { seen } else { 0.0 };
-                own[y][x] += g.depth * seen;
+        for k in line.within(low, high) {
+            let p = line.at(k);
+            let (x, y) = place(p);
+            if interpolation == Interpolation::OpticalDepth {
+                let seen = if p[2] <= plane { 1.0 } else { f };
+                let seen = if p[2] <= plane + 1 { seen } else { 0.0 };
+                self.0[0][y][x] += line.each * seen;
+                continue;
             }
-            return;
-        }
-        let first = if interpolation == Interpolation::Cubic { plane - 1 } else { plane };
-        for g in fragments {
-            let (x, y) = place(g);
+            let first = if interpolation == Interpolation::Cubic { plane - 1 } else { plane };
             for (k, own) in self.0[..planes(interpolation)].iter_mut().enumerate() {
-                if i32::from(g.layer) <= first + k as i32 {
-                    own[y][x] += g.depth;
+                if p[2] <= first + k as i32 {
+                    own[y][x] += line.each;
                 }
             }
         }
@@ -154,14 +136,17 @@ impl Volume {
         self.depth.fill(0.0);
     }
 
-    /// Adds a segment; coordinates in texels of the volume and slices.
-    pub fn splat(&mut self, segment: &Segment) {
-        let (row, layer) = (self.stride as i32, (self.stride * self.side) as i32);
-        let (side, slices) = (self.side, self.slices);
+    /// Texels along a side, with the border.
+    pub fn side(&self) -> usize {
+        self.side
+    }
+
+    /// Adds a line.
+    #[inline]
+    pub fn add(&mut self, line: &Line) {
         let depth = &mut self.depth[..];
-        fragments(segment, side, slices, |x, y, z, d| {
-            depth[(z * layer + y * row + x) as usize] += d;
-        });
+        let size = [self.side, self.stride, self.stride * self.side, self.slices + 1];
+        line.places(size, |p| depth[p] += line.each);
     }
 
     /// From parts to sums along the light.
@@ -238,90 +223,4 @@ fn cubic(a: f32x4, b: f32x4, c: f32x4, d: f32x4, t: f32x4) -> f32x4 {
     let three = f32x4::splat(3.0);
     let v = b + t * (m0 + t * (three * rise - two * m0 - m1 + t * (m0 + m1 - two * rise)));
     v.fast_max(b.fast_min(c)).fast_min(b.fast_max(c))
-}
-
-/// Optical depth per area covered: -ln(1 - o c) / c for the coverage c that a hair of `width` texels has of a texel
-/// that it crosses. Hairs of one texel are independent of each other, so its mean transmittance is the product of 1 - o
-/// c; o alone (its limit for thin hairs) leaves hairs of a texel's width too clear, and -ln(1 - o), right for a hair
-/// that covers the texel, makes thin ones too dark.
-#[inline]
-pub(crate) fn thickness(width: f32, opacity: f32) -> f32 {
-    let width = width.max(1e-6);
-    let c = if width < 1.0 { width * (1.0 - width / 3.0) } else { 1.0 - 1.0 / (3.0 * width) };
-    let x = opacity * c;
-    if x < 0.1 {
-        opacity * (1.0 + x * (0.5 + x * (1.0 / 3.0 + x * (0.25 + x * 0.2))))
-    } else {
-        -libm::logf(1.0 - x.min(OPAQUE)) / c
-    }
-}
-
-/// Cuts a segment into equal pieces of half a texel and one slice at most, each of which goes to the texel and layer of
-/// its middle. Whatever the width and the place, the pieces add up to the area that the hair covers.
-#[inline]
-pub(crate) fn fragments(segment: &Segment, side: usize, slices: usize, mut emit: impl FnMut(i32, i32, i32, f32)) {
-    let (a, b) = (segment.a, segment.b);
-    let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
-    let length = (dx * dx + dy * dy).sqrt();
-    let depth = segment.thickness * segment.width * length;
-    if !(depth > 0.0 && depth < f32::MAX) {
-        return;
-    }
-    if segment.width <= LINE {
-        line(a, b, depth, side, slices, &mut emit);
-        return;
-    }
-    let lines = (segment.width / LINE).ceil().min(LINES);
-    let (nx, ny) = (-dy / length * segment.width, dx / length * segment.width);
-    for k in 0..lines as usize {
-        let t = (k as f32 + 0.5) / lines - 0.5;
-        let shift = |p: [f32; 3]| [p[0] + nx * t, p[1] + ny * t, p[2]];
-        line(shift(a), shift(b), depth / lines, side, slices, &mut emit);
-    }
-}
-
-/// One line of no width.
-#[inline]
-fn line(a: [f32; 3], b: [f32; 3], depth: f32, side: usize, slices: usize, emit: &mut impl FnMut(i32, i32, i32, f32)) {
-    let high = side as f32;
-    let top = slices as f32 + 1.0;
-    let (mut from, mut to) = (0.0f32, 1.0f32);
-    for i in 0..2 {
-        let (low_end, high_end) = (a[i].min(b[i]), a[i].max(b[i]));
-        if low_end >= 0.0 && high_end < high {
-            continue;
-        }
-        if low_end >= high || high_end < 0.0 {
-            return;
-        }
-        let inverse = 1.0 / (b[i] - a[i]);
-        let (u, v) = (-a[i] * inverse, (high - a[i]) * inverse);
-        from = from.max(u.min(v));
-        to = to.min(u.max(v));
-    }
-    if !(from < to) {
-        return;
-    }
-    let part = to - from;
-    let d = [(b[0] - a[0]) * part, (b[1] - a[1]) * part, (b[2] - a[2]) * part];
-    // Slices beyond the ends do not count.
-    let (s0, s1) = (a[2] + (b[2] - a[2]) * from, a[2] + (b[2] - a[2]) * to);
-    if s0.min(s1) >= slices as f32 {
-        return;
-    }
-    let deep = (s0.clamp(-1.0, top) - s1.clamp(-1.0, top)).abs();
-    let steps = (PIECES * d[0].abs().max(d[1].abs())).max(deep * (d[2].abs() / deep.max(1e-6)).min(4.0));
-    let steps = steps as i32 + 1;
-    let inverse = 1.0 / steps as f32;
-    let each = depth * part * inverse;
-    let step = d.map(|v| v * inverse);
-    let first = [a[0] + (b[0] - a[0]) * from, a[1] + (b[1] - a[1]) * from, s0 + 1.0];
-    let last = side as i32 - 1;
-    for k in 0..steps {
-        let t = k as f32 + 0.5;
-        let x = ((first[0] + step[0] * t) as i32).clamp(0, last);
-        let y = ((first[1] + step[1] * t) as i32).clamp(0, last);
-        let layer = (first[2] + step[2] * t).clamp(0.0, top) as i32;
-        emit(x, y, layer, each);
-    }
 }
