@@ -33,7 +33,10 @@ fn main() {
                 let (light, counts) = transmittance(source, &layers, &[], &settings).expect("light");
                 let s = start.elapsed().as_secs_f64();
                 let [rms, p95, bias] = score(&light, &points, &truth);
-                println!("{name},{texels},{slices},{rms:.4},{p95:.4},{bias:+.4},{s:.3},{:.1}", counts.bytes as f64 / 1e6);
+                println!(
+                    "{name},{texels},{slices},{rms:.4},{p95:.4},{bias:+.4},{s:.3},{:.1}",
+                    counts.bytes as f64 / 1e6
+                );
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Segments sorted into the tiles they touch.
 
-use super::project::{Place, Projection};
 use super::line::thickness;
+use super::project::{Place, Projection};
 use super::{ShadowHair, TILE};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -174,31 +174,58 @@ fn try_chunks(projection: &Projection, layers: &[ShadowHair], room: usize) -> Op
             let mut chunk = place(projection, &layers[l], l, strands, shift);
             chunk.weigh(&layers[l], projection);
             let touched = touched(&chunk, projection, &layers[l], grid);
+            let mut start = vec![0; grid * grid + 1];
+            for (k, r) in touched.iter().enumerate() {
+                r.each(&chunk, k, &layers[l], projection, |t| start[t + 1] += 1);
+            }
+            for t in 0..grid * grid {
+                start[t + 1] += start[t];
+            }
+            chunk.start = start;
             (chunk, touched)
         })
         .collect();
-    let pairs: usize = done.iter().flat_map(|d| d.1.iter().map(Tiles::count)).sum();
+    let pairs: usize = done.iter().map(|(chunk, _)| chunk.start[grid * grid] as usize).sum();
     if pairs > room {
         return None;
     }
-    done.par_iter_mut().for_each(|(chunk, touched)| sort(chunk, touched, grid));
+    done.par_iter_mut().for_each(|(chunk, touched)| sort(chunk, touched, &layers[chunk.layer], projection));
     Some((done.into_iter().map(|d| d.0).collect(), grid))
 }
 
 /// A block of tiles: first and last column, first and last row; nothing if a last is before its first.
+#[derive(Clone, Copy)]
 struct Tiles([u16; 4]);
 
 impl Tiles {
     const NONE: Tiles = Tiles([1, 0, 1, 0]);
 
-    fn count(&self) -> usize {
+    /// Visits those of the block that point `k`, or the segment that begins there, touches: in blocks more than one tile
+    /// high and wide, row by row, as much of each as the segment reaches.
+    #[inline]
+    fn each(self, chunk: &Chunk, k: usize, layer: &ShadowHair, projection: &Projection, mut visit: impl FnMut(usize)) {
         let [x0, x1, y0, y1] = self.0.map(usize::from);
-        (x1 + 1 - x0) * (y1 + 1 - y0)
-    }
-
-    fn all(&self, grid: usize) -> impl Iterator<Item = usize> + use<> {
-        let [x0, x1, y0, y1] = self.0.map(usize::from);
-        (y0..=y1).flat_map(move |y| (x0..=x1).map(move |x| y * grid + x))
+        let grid = projection.texels.div_ceil(TILE);
+        let slanted = if x1 > x0 && y1 > y0 { chunk.segment(k, layer, projection) } else { None };
+        for y in y0..=y1 {
+            let (mut from, mut to) = (x0, x1);
+            if let Some(s) = &slanted {
+                let pad = 0.5 * s.width + projection.border() as f32 + 0.01;
+                let [low, high] = [y * TILE, (y + 1) * TILE].map(|v| v as f32);
+                let slope = (s.b[0] - s.a[0]) / (s.b[1] - s.a[1]);
+                let at = |v: f32| s.a[0] + (v.clamp(s.a[1].min(s.b[1]), s.a[1].max(s.b[1])) - s.a[1]) * slope;
+                let (u, v) = (at(low - pad), at(high + pad));
+                // A segment along the rows has no slope, and is in all columns.
+                if u.is_finite() && v.is_finite() {
+                    let tile = |v: f32| (v * (1.0 / TILE as f32)).clamp(0.0, (grid - 1) as f32) as usize;
+                    from = from.max(tile(u.min(v) - pad));
+                    to = to.min(tile(u.max(v) + pad));
+                }
+            }
+            for x in from..=to {
+                visit(y * grid + x);
+            }
+        }
     }
 }
 
@@ -227,8 +254,7 @@ fn place(
 ) -> Chunk {
     let end = layer.position.len();
     let first = layer.offsets.range(strands.start).start.min(end);
-    let mut chunk =
-        Chunk { layer: index, first, strand_shift, ..Chunk::default() };
+    let mut chunk = Chunk { layer: index, first, strand_shift, ..Chunk::default() };
     chunk.point.reserve(layer.offsets.range(strands.end - 1).end.min(end) - first);
     for s in strands {
         let range = layer.offsets.range(s);
@@ -279,24 +305,14 @@ fn touched(chunk: &Chunk, projection: &Projection, layer: &ShadowHair, grid: usi
 }
 
 /// Fills the lists by tile: a counting sort, in order of the points.
-fn sort(chunk: &mut Chunk, touched: &mut Vec<Tiles>, grid: usize) {
-    let mut start = vec![0u32; grid * grid + 1];
-    for r in touched.iter() {
-        for t in r.all(grid) {
-            start[t + 1] += 1;
-        }
-    }
-    for t in 0..grid * grid {
-        start[t + 1] += start[t];
-    }
-    let mut next = start.clone();
-    chunk.list = vec![0; start[grid * grid] as usize];
-    for (k, r) in touched.iter().enumerate() {
-        for t in r.all(grid) {
-            chunk.list[next[t] as usize] = k as u32;
+fn sort(chunk: &mut Chunk, touched: &mut Vec<Tiles>, layer: &ShadowHair, projection: &Projection) {
+    let mut next = chunk.start.clone();
+    let mut list = vec![0; next[next.len() - 1] as usize];
+    for (k, r) in std::mem::take(touched).into_iter().enumerate() {
+        r.each(chunk, k, layer, projection, |t| {
+            list[next[t] as usize] = k as u32;
             next[t] += 1;
-        }
+        });
     }
-    chunk.start = start;
-    *touched = Vec::new();
+    chunk.list = list;
 }

@@ -69,8 +69,7 @@ impl Axis {
     #[inline]
     pub(crate) fn crossed(&self, origin: &Vec3, toward: &Vec3, reach: f64) -> Option<f64> {
         let r = self.a - origin;
-        let (uu, ud, ur, rd) =
-            (self.along.norm_squared(), self.along.dot(toward), self.along.dot(&r), r.dot(toward));
+        let (uu, ud, ur, rd) = (self.along.norm_squared(), self.along.dot(toward), self.along.dot(&r), r.dot(toward));
         let square = uu - ud * ud;
         if square <= 1e-14 * uu {
             return None;
@@ -95,8 +94,7 @@ pub fn transmittance_exact(
     footprint: &Footprint,
     points: &[[usize; 2]],
 ) -> Result<Vec<Sample>, BadSource> {
-    let settings =
-        ShadowSettings { texels: TEXELS, filter: footprint.side, ..ShadowSettings::default() }.clamped();
+    let settings = ShadowSettings { texels: TEXELS, filter: footprint.side, ..ShadowSettings::default() }.clamped();
     let (mut projections, _) = fit(source, layers, &settings)?;
     let mut out = vec![Sample { mean: 1.0, variance: 0.0 }; points.len()];
     for projection in &mut projections {
@@ -158,13 +156,7 @@ impl Cells {
                 let Some(s) = chunk.segment(k, layer, projection) else { continue };
                 let i = chunk.first + k;
                 let index = axis.len() as u32;
-                axis.push(Axis::new(
-                    layer,
-                    chunk.layer_strand(k),
-                    i,
-                    chunk.point[k].strand(),
-                    s.a[2].min(s.b[2]),
-                ));
+                axis.push(Axis::new(layer, chunk.layer_strand(k), i, chunk.point[k].strand(), s.a[2].min(s.b[2])));
                 // Wide enough for either end's width and for rounding.
                 let unit = projection.per_unit(s.a[2]).max(projection.per_unit(s.b[2]));
                 let width = layer.width(i).max(layer.width(i + 1)) * unit * projection.stretch(&s.a, &s.b);
@@ -228,7 +220,7 @@ impl Cells {
             product
         };
         let side = footprint.side * projection.texels as f64;
-        if !(side > 0.0) || footprint.rays <= 1 {
+        if side.is_nan() || side <= 0.0 || footprint.rays <= 1 {
             return Sample { mean: light(0.0, 0.0), variance: 0.0 };
         }
         let strata = ((footprint.rays as f64 / 2.0).sqrt().ceil() as usize).max(1);

@@ -11,7 +11,7 @@ const LINE: f32 = 0.3;
 const LINES: f32 = 128.0;
 
 /// Deposits of a line per texel. With 1 the error of the default grows by a tenth; more than 4 change nothing.
-const DEPOSITS: f32 = 2.0;
+const DEPOSITS: f32 = 3.0;
 
 /// Deposits of a line per slice.
 const DEEP: f32 = 1.0;

@@ -78,6 +78,8 @@ pub struct ShadowHair<'a> {
 /// What was done and what could not be.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ShadowCounts {
+    /// Texels along a side of the map: fewer than asked for where filter or hairs are very wide.
+    pub texels: usize,
     /// Points that took a value from the map.
     pub points: usize,
     /// Segments that cast shadow; once per face of a cube.
@@ -108,7 +110,9 @@ pub enum BadSource {
 impl std::fmt::Display for BadSource {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
-            BadSource::Direction => "the light's direction has no length or is not finite: give a vector like [0, -1, 0]",
+            BadSource::Direction => {
+                "the light's direction has no length or is not finite: give a vector like [0, -1, 0]"
+            }
             BadSource::Position => "the light's position is not finite: give three numbers in scene units",
         })
     }
@@ -132,10 +136,8 @@ pub fn transmittance(
         counts.masked = 0;
         face(projection, layers, &settings, &cells, &mut counts);
     }
-    let mut out: Vec<Vec<f32>> = cells
-        .into_iter()
-        .map(|c| c.into_par_iter().map(|v| f32::from_bits(v.into_inner())).collect())
-        .collect();
+    let mut out: Vec<Vec<f32>> =
+        cells.into_iter().map(|c| c.into_par_iter().map(|v| f32::from_bits(v.into_inner())).collect()).collect();
     if let Some(projection) = projections.first() {
         counts.behind_solid = solid::shade(projection, layers, solids, &mut out);
     }
@@ -168,6 +170,7 @@ fn face(
             |work, t| usize::from(work.run(&chunks, layers, [t % grid, t / grid], t, cells)),
         )
         .sum();
+    counts.texels = projection.texels;
     counts.tiles[0] += worked;
     counts.tiles[1] += grid * grid;
     let held: usize = chunks.iter().map(Chunk::bytes).sum();

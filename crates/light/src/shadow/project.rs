@@ -6,7 +6,13 @@ use pelage_geom::Vec3;
 use rayon::prelude::*;
 
 /// Coordinates beyond this count as not finite: their squares still fit single precision.
-pub(crate) const HUGE: f64 = 1e18;
+const HUGE: f64 = 1e18;
+
+/// False for what is not finite or out of range.
+#[inline]
+pub(crate) fn is_usable(p: Vec3) -> bool {
+    p.x.abs() < HUGE && p.y.abs() < HUGE && p.z.abs() < HUGE
+}
 
 /// A point light this many times the hair's size away is parallel light: the rays differ by less than 1e-6 radians, and
 /// farther away double precision cannot tell the hairs apart.
@@ -88,7 +94,7 @@ impl Projection {
     /// Where a point falls.
     #[inline]
     pub fn place(&self, p: Vec3) -> Place {
-        if !(p.x.abs() < HUGE && p.y.abs() < HUGE && p.z.abs() < HUGE) {
+        if !is_usable(p) {
             return Place::Bad;
         }
         let l = self.local(p);
@@ -134,14 +140,13 @@ impl Projection {
 
     /// Plane coordinates of the part of a segment that this face follows.
     pub fn clip_points(&self, a: Vec3, b: Vec3) -> Option<[[f32; 3]; 2]> {
-        if self.reach.is_none() || !(a.amax() < HUGE && b.amax() < HUGE) {
+        if self.reach.is_none() || !(is_usable(a) && is_usable(b)) {
             return None;
         }
         let (a, b) = (self.local(a), self.local(b));
         let (mut from, mut to) = (0.0f64, 1.0f64);
-        let inside = |l: Vec3| {
-            [l.z - self.near, BEYOND * l.z - l.x, BEYOND * l.z + l.x, BEYOND * l.z - l.y, BEYOND * l.z + l.y]
-        };
+        let inside =
+            |l: Vec3| [l.z - self.near, BEYOND * l.z - l.x, BEYOND * l.z + l.x, BEYOND * l.z - l.y, BEYOND * l.z + l.y];
         for (x, y) in inside(a).into_iter().zip(inside(b)) {
             if x < 0.0 && y < 0.0 {
                 return None;
@@ -253,7 +258,7 @@ fn axes(z: Vec3) -> [Vec3; 3] {
 
 fn unit(v: Vec3) -> Result<Vec3, BadSource> {
     let largest = v.amax();
-    if !(largest > 0.0 && largest.is_finite()) {
+    if v.iter().any(|x| !x.is_finite()) || largest == 0.0 {
         return Err(BadSource::Direction);
     }
     Ok((v / largest).normalize())
@@ -285,10 +290,8 @@ pub(crate) fn fit(
     };
     let (lo, hi) = (Vec3::from(lo), Vec3::from(hi));
     let (centre, size) = (0.5 * (lo + hi), (hi - lo).norm().max(1e-12 * hi.amax().max(lo.amax())).max(1e-30));
-    counts.bad_points = layers
-        .iter()
-        .map(|l| (0..l.position.len()).into_par_iter().filter(|&i| !(l.point(i).amax() < HUGE)).count())
-        .sum();
+    counts.bad_points =
+        layers.iter().map(|l| (0..l.position.len()).into_par_iter().filter(|&i| !is_usable(l.point(i))).count()).sum();
     let common = |axis, eye, reach, low, side: f64, cube| {
         let side = side.max(1e-30);
         let scale = settings.texels as f64 / side;

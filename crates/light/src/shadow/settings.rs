@@ -53,10 +53,10 @@ impl Quality {
     /// The settings of this name.
     pub fn settings(self) -> ShadowSettings {
         let (texels, slices) = match self {
-            Quality::Draft => (256, 64),
-            Quality::Default => (512, 128),
-            Quality::Fine => (1024, 256),
-            Quality::Reference => (2048, 512),
+            Quality::Draft => (512, 32),
+            Quality::Default => (1024, 64),
+            Quality::Fine => (2048, 128),
+            Quality::Reference => (4096, 256),
         };
         ShadowSettings { texels, slices, ..ShadowSettings::default() }
     }
@@ -68,9 +68,9 @@ const FOOTPRINT: f64 = 1.0 / 256.0;
 impl Default for ShadowSettings {
     fn default() -> Self {
         ShadowSettings {
-            texels: 512,
-            slices: 128,
-            placement: Placement::Uniform,
+            texels: 1024,
+            slices: 64,
+            placement: Placement::Histogram,
             filter: FOOTPRINT,
             interpolation: Interpolation::OpticalDepth,
         }
@@ -102,7 +102,7 @@ pub struct Measured {
 }
 
 /// Errors of the default footprint, cheapest first.
-pub const MEASURED: [Measured; 1] = [Measured { size: [512, 128], rms: 0.02 }];
+pub const MEASURED: [Measured; 2] = [Measured { size: [512, 32], rms: 0.04 }, Measured { size: [1024, 64], rms: 0.02 }];
 
 /// The cheapest measured settings whose RMS error is at most `rms`; the finest if none is.
 pub fn for_error(rms: f64) -> ShadowSettings {

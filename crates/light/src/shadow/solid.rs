@@ -1,7 +1,7 @@
 //! What solid things hide from a light.
 
 use super::ShadowHair;
-use super::project::{HUGE, Projection};
+use super::project::{Projection, is_usable};
 use pelage_geom::{Bvh, Vec3};
 use rayon::prelude::*;
 
@@ -54,7 +54,7 @@ pub(crate) fn shade(projection: &Projection, layers: &[ShadowHair], solids: &[So
     }
     let hidden = |layer: &ShadowHair, i: usize| {
         let p = layer.point(i);
-        if !(p.amax() < HUGE) {
+        if !is_usable(p) {
             return false;
         }
         let Some((toward, distance)) = projection.toward(p) else { return false };

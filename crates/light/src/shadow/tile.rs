@@ -108,13 +108,7 @@ impl<'a> Work<'a> {
     }
 
     /// Lists what the tile has, in texels of the volume; the depths of its first and last receiver.
-    fn gather(
-        &mut self,
-        chunks: &[Chunk],
-        layers: &[ShadowHair],
-        place: [usize; 2],
-        t: usize,
-    ) -> Option<[f32; 2]> {
+    fn gather(&mut self, chunks: &[Chunk], layers: &[ShadowHair], place: [usize; 2], t: usize) -> Option<[f32; 2]> {
         self.segment.clear();
         self.receiver.clear();
         let border = self.projection.border() as f32;
@@ -154,9 +148,8 @@ impl<'a> Work<'a> {
     /// Places the slices between depths `from` and `to`, and turns depths into slice coordinates.
     fn place_slices(&mut self, from: f32, to: f32) {
         let slices = self.settings.slices as f32;
-        let range = (to - from).max(f32::MIN_POSITIVE);
-        let scale = BINS as f32 / range;
-        let scale = if scale.is_finite() { scale } else { 0.0 };
+        // Points of one depth still lie behind what is nearer the light.
+        let scale = BINS as f32 / (to - from).max(1e-6 * from.abs().max(to.abs())).max(1e-30);
         self.warp.clear();
         match self.settings.placement {
             Placement::Uniform => self.warp.extend((0..=BINS).map(|b| b as f32 * slices / BINS as f32)),
@@ -201,12 +194,7 @@ impl<'a> Work<'a> {
     }
 
     /// Gives points of one strand their values.
-    fn receive(
-        &mut self,
-        receivers: std::ops::Range<usize>,
-        lines: std::ops::Range<usize>,
-        cells: &[Vec<AtomicU32>],
-    ) {
+    fn receive(&mut self, receivers: std::ops::Range<usize>, lines: std::ops::Range<usize>, cells: &[Vec<AtomicU32>]) {
         let interpolation = self.settings.interpolation;
         for r in &self.receiver[receivers] {
             let window = Window::new(r.at[0], r.at[1], self.projection.filter);

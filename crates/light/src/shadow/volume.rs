@@ -189,8 +189,8 @@ impl Volume {
                         let before = plane.max(1) - 1;
                         let after = (plane + 2).min(self.slices);
                         let z = at(before, row, x) - if plane > 0 { own(0, row, x) } else { own(1, row, x) };
-                        let c = at(after, row, x)
-                            - if plane + 2 <= self.slices { own(3, row, x) } else { own(2, row, x) };
+                        let c =
+                            at(after, row, x) - if plane + 2 <= self.slices { own(3, row, x) } else { own(2, row, x) };
                         exp_neg(cubic(z, a, b, c, f4))
                     }
                 };

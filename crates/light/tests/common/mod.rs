@@ -152,8 +152,7 @@ pub fn some_points(layers: &[ShadowHair], count: usize) -> Vec<[usize; 2]> {
 
 /// Error of maps: root mean square without the truth's noise, 95th percentile of its size, mean.
 pub fn score(light: &[Vec<f32>], points: &[[usize; 2]], truth: &[pelage_light::shadow::Sample]) -> [f64; 3] {
-    let error: Vec<f64> =
-        points.iter().zip(truth).map(|(&[l, i], t)| f64::from(light[l][i]) - t.mean).collect();
+    let error: Vec<f64> = points.iter().zip(truth).map(|(&[l, i], t)| f64::from(light[l][i]) - t.mean).collect();
     let n = error.len() as f64;
     let noise = truth.iter().map(|t| t.variance).sum::<f64>() / n;
     let square = error.iter().map(|e| e * e).sum::<f64>() / n;
