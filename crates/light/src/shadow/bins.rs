@@ -175,6 +175,11 @@ fn try_chunks(projection: &Projection, layers: &[ShadowHair], room: usize) -> Op
             chunk.weigh(&layers[l], projection);
             let touched = touched(&chunk, projection, &layers[l], grid);
             let mut start = vec![0; grid * grid + 1];
+            if touched.iter().map(Tiles::block).sum::<usize>() / 64 > room {
+                start[grid * grid] = u32::MAX;
+                chunk.start = start;
+                return (chunk, touched);
+            }
             for (k, r) in touched.iter().enumerate() {
                 r.each(&chunk, k, &layers[l], projection, |t| start[t + 1] += 1);
             }
@@ -199,6 +204,12 @@ struct Tiles([u16; 4]);
 
 impl Tiles {
     const NONE: Tiles = Tiles([1, 0, 1, 0]);
+
+    /// Tiles of the block.
+    fn block(&self) -> usize {
+        let [x0, x1, y0, y1] = self.0.map(usize::from);
+        (x1 + 1 - x0) * (y1 + 1 - y0)
+    }
 
     /// Visits those of the block that point `k`, or the segment that begins there, touches: in blocks more than one tile
     /// high and wide, row by row, as much of each as the segment reaches.

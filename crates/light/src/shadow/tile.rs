@@ -29,6 +29,7 @@ pub(crate) struct Work<'a> {
     line: Vec<Line>,
     warp: Vec<f32>,
     own: Own,
+    window: Window,
 }
 
 /// A segment in texels of the volume and the strand it is of.
@@ -56,6 +57,7 @@ impl<'a> Work<'a> {
             line: Vec::new(),
             warp: Vec::new(),
             own: Own::new(),
+            window: Window::new(),
         }
     }
 
@@ -197,13 +199,14 @@ impl<'a> Work<'a> {
     fn receive(&mut self, receivers: std::ops::Range<usize>, lines: std::ops::Range<usize>, cells: &[Vec<AtomicU32>]) {
         let interpolation = self.settings.interpolation;
         for r in &self.receiver[receivers] {
-            let window = Window::new(r.at[0], r.at[1], self.projection.filter);
+            let window = &mut self.window;
+            window.put(r.at[0], r.at[1], self.projection.filter);
             let (plane, f) = self.volume.plane(r.at[2]);
-            self.own.clear(&window, interpolation);
+            self.own.clear(window, interpolation);
             for line in &self.line[lines.clone()] {
-                self.own.add(&window, line, plane as i32, f, interpolation);
+                self.own.add(window, line, plane as i32, f, interpolation);
             }
-            let light = self.volume.sample(&window, r.at[2], &self.own, interpolation);
+            let light = self.volume.sample(window, r.at[2], &self.own, interpolation);
             cells[r.layer as usize][r.point as usize].store(light.to_bits(), Ordering::Relaxed);
         }
     }

@@ -4,7 +4,7 @@ use super::TILE;
 use super::exp::exp_neg;
 use super::line::Line;
 use super::settings::Interpolation;
-use wide::f32x4;
+use wide::{f32x4, i32x4};
 
 /// Taps of the widest filter along a side, a multiple of 4.
 pub(crate) const TAPS: usize = 20;
@@ -29,26 +29,26 @@ pub(crate) struct Window {
 }
 
 impl Window {
-    /// The square of side `filter` around (x, y).
+    pub fn new() -> Window {
+        Window { x: 0, y: 0, across: 0, down: 0, weight: [[0.0; TAPS]; 2] }
+    }
+
+    /// Moves to the square of side `filter` around (x, y).
     #[inline]
-    pub fn new(x: f32, y: f32, filter: f32) -> Window {
-        let mut w = Window { x: 0, y: 0, across: 0, down: 0, weight: [[0.0; TAPS]; 2] };
+    pub fn put(&mut self, x: f32, y: f32, filter: f32) {
         let inverse = 1.0 / filter;
-        for (i, v) in [x, y].into_iter().enumerate() {
+        let place = |v: f32, weight: &mut [f32; TAPS]| {
             let (low, high) = (v - 0.5 * filter, v + 0.5 * filter);
-            let first = low.floor();
-            let taps = ((high - first).ceil() as usize).clamp(1, TAPS - 3);
-            for (k, weight) in w.weight[i][..taps].iter_mut().enumerate() {
-                let at = first + k as f32;
+            let first = low as i32;
+            let taps = ((high - first as f32).ceil() as usize).clamp(1, TAPS - 3);
+            for (k, weight) in weight[..taps.next_multiple_of(4)].iter_mut().enumerate() {
+                let at = (first + k as i32) as f32;
                 *weight = ((at + 1.0).min(high) - at.max(low)).max(0.0) * inverse;
             }
-            if i == 0 {
-                (w.x, w.across) = (first as i32, taps);
-            } else {
-                (w.y, w.down) = (first as i32, taps);
-            }
-        }
-        w
+            (first, taps)
+        };
+        (self.x, self.across) = place(x, &mut self.weight[0]);
+        (self.y, self.down) = place(y, &mut self.weight[1]);
     }
 
     /// Its texels as a box.
@@ -60,18 +60,18 @@ impl Window {
 }
 
 /// Optical depth that the hair itself puts into the window of one of its points, for the planes that are interpolated.
-pub(crate) struct Own([[[f32; TAPS]; TAPS]; 4]);
+pub(crate) struct Own([[f32; TAPS * TAPS]; 4]);
 
 impl Own {
     pub fn new() -> Own {
-        Own([[[0.0; TAPS]; TAPS]; 4])
+        Own([[0.0; TAPS * TAPS]; 4])
     }
 
     #[inline]
     pub fn clear(&mut self, window: &Window, interpolation: Interpolation) {
         let quads = window.across.div_ceil(4) * 4;
         for plane in &mut self.0[..planes(interpolation)] {
-            for row in &mut plane[..window.down] {
+            for row in plane.chunks_exact_mut(TAPS).take(window.down) {
                 row[..quads].fill(0.0);
             }
         }
@@ -82,24 +82,25 @@ impl Own {
     #[inline]
     pub fn add(&mut self, window: &Window, line: &Line, plane: i32, f: f32, interpolation: Interpolation) {
         let (low, high) = window.bounds();
-        let place = |p: [i32; 3]| {
-            let x = ((p[0] - window.x) as u32).min(window.across as u32) as usize;
-            let y = ((p[1] - window.y) as u32).min(window.down as u32) as usize;
-            (x, y)
-        };
-        for k in line.within(low, high) {
-            let p = line.at(k);
-            let (x, y) = place(p);
+        let end = [window.across, window.down].map(|n| n as f32);
+        for k in line.within(low, high).step_by(4) {
+            let [x, y, z, depth] = line.quad(k, low, end);
+            let place: i32x4 = (y * f32x4::splat(TAPS as f32) + x).fast_trunc_int();
             if interpolation == Interpolation::OpticalDepth {
-                let seen = if p[2] <= plane { 1.0 } else { f };
-                let seen = if p[2] <= plane + 1 { seen } else { 0.0 };
-                self.0[0][y][x] += line.each * seen;
+                // All of what lies before the plane, f of what lies between it and the next.
+                let seen = f32x4::splat(plane as f32 + 1.0 + f) - z;
+                let seen = (seen.fast_max(f32x4::ZERO).fast_min(f32x4::ONE) * depth).to_array();
+                for (p, d) in place.to_array().into_iter().zip(seen) {
+                    self.0[0][p as usize] += d;
+                }
                 continue;
             }
             let first = if interpolation == Interpolation::Cubic { plane - 1 } else { plane };
-            for (k, own) in self.0[..planes(interpolation)].iter_mut().enumerate() {
-                if p[2] <= first + k as i32 {
-                    own[y][x] += line.each;
+            for ((p, z), d) in place.to_array().into_iter().zip(z.to_array()).zip(depth.to_array()) {
+                for (k, own) in self.0[..planes(interpolation)].iter_mut().enumerate() {
+                    if z <= (first + k as i32) as f32 {
+                        own[p as usize] += d;
+                    }
                 }
             }
         }
@@ -170,7 +171,7 @@ impl Volume {
             f32x4::from(<[f32; 4]>::try_from(&self.depth[start..start + 4]).unwrap_or_default())
         };
         let own = |k: usize, row: usize, x: usize| {
-            f32x4::from(<[f32; 4]>::try_from(&own.0[k][row][x..x + 4]).unwrap_or_default())
+            f32x4::from(<[f32; 4]>::try_from(&own.0[k][row * TAPS + x..row * TAPS + x + 4]).unwrap_or_default())
         };
         let f4 = f32x4::splat(f);
         let mut sum = f32x4::ZERO;
