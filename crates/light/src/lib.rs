@@ -10,6 +10,7 @@ pub mod image;
 pub mod preview;
 mod raster;
 pub mod shade;
+pub mod shadow;
 mod skin_map;
 mod slab;
 

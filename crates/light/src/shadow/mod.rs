@@ -1,0 +1,201 @@
+//! Opacity shadow maps: how much light of a source reaches every point of every hair, past other hairs and solids.
+//!
+//! The method is Kim's (opacity shadow maps, SIGGRAPH 2003 course notes, §4) cut into tiles: the plane across the light
+//! is divided into squares of [`TILE`] texels, the hair segments are sorted into them, and each tile sums optical depth
+//! into slices of its own, samples its own points and is forgotten. Tiles are independent, so the bytes are the same
+//! for any number of threads, and memory is 24 bytes a point, about 6 a segment and one tile a thread, whatever
+//! the resolution times the slices.
+//!
+//! Transmittance is the fraction of light that passes all *other* hairs and all solids: a hair of opacity o that lies
+//! across a ray multiplies by 1 - o. Falloff with distance and the shape of a spot's beam are not in it.
+
+mod bins;
+mod exact;
+mod exp;
+mod line;
+mod project;
+mod settings;
+mod solid;
+mod tile;
+mod volume;
+
+pub use exact::{Footprint, Sample, transmittance_exact};
+pub use settings::{Interpolation, MEASURED, Measured, Placement, Quality, ShadowSettings, for_error};
+pub use solid::Solid;
+
+use bins::{Chunk, chunks};
+use pelage_geom::{Offsets, Vec3};
+use project::{Projection, fit};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// Side of a tile, texels. A tile's slices should stay in the second-level cache: 36 x 36 texels with their border and
+/// 128 slices are 660 KB. Much smaller tiles repeat segments that cross their borders.
+pub(crate) const TILE: usize = 32;
+
+/// Where light comes from: world space, scene units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Source {
+    /// Parallel light.
+    Directional {
+        /// The way it travels, of any length but zero.
+        direction: Vec3,
+    },
+    /// Light from a point to all sides. Farther than a million times the hair's size it counts as parallel.
+    Point {
+        /// Where.
+        position: Vec3,
+    },
+    /// Light from a point into a cone; points outside the cone get transmittance 0 and are counted.
+    Spot {
+        /// Where.
+        position: Vec3,
+        /// Middle of the cone, of any length but zero.
+        direction: Vec3,
+        /// Half angle of the full beam, radians.
+        cone: f64,
+        /// Angle beyond it over which the beam ends, radians.
+        softness: f64,
+    },
+}
+
+/// The hairs of one layer that cast and receive shadow.
+#[derive(Clone, Copy, Debug)]
+pub struct ShadowHair<'a> {
+    /// Runs of points, one a strand.
+    pub offsets: &'a Offsets,
+    /// Points, scene units relative to `origin`; root first.
+    pub position: &'a [[f32; 3]],
+    /// Scene-space point that positions are relative to.
+    pub origin: [f64; 3],
+    /// Diameter, scene units, one a point; what is missing, negative or not finite is 0 and casts no shadow.
+    pub width: &'a [f32],
+    /// Opacity of a hair's whole width in [0, 1], one a strand, or one a point (recognised by length); what is
+    /// missing is 1.
+    pub opacity: &'a [f32],
+}
+
+/// What was done and what could not be.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ShadowCounts {
+    /// Texels along a side of the map: fewer than asked for where filter or hairs are very wide.
+    pub texels: usize,
+    /// Points that took a value from the map.
+    pub points: usize,
+    /// Segments that cast shadow; once per face of a cube.
+    pub segments: usize,
+    /// Points left out because they are not finite or out of range: their transmittance is 1, the hair is cut there.
+    pub bad_points: usize,
+    /// Points outside a spot's cone, with transmittance 0.
+    pub masked: usize,
+    /// Tiles that were worked, of all that the maps have.
+    pub tiles: [usize; 2],
+    /// Segments over all tiles: at least `segments` where all are in use, more as they cross tiles.
+    pub pairs: usize,
+    /// Points that solids hide from the light.
+    pub behind_solid: usize,
+    /// Most memory held at once apart from input and result, bytes, for one thread.
+    pub bytes: usize,
+}
+
+/// Why nothing was computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BadSource {
+    /// A direction of no length, or not finite.
+    Direction,
+    /// A position that is not finite.
+    Position,
+}
+
+impl std::fmt::Display for BadSource {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            BadSource::Direction => {
+                "the light's direction has no length or is not finite: give a vector like [0, -1, 0]"
+            }
+            BadSource::Position => "the light's position is not finite: give three numbers in scene units",
+        })
+    }
+}
+
+impl std::error::Error for BadSource {}
+
+/// Transmittance of every point of every layer, from maps.
+pub fn transmittance(
+    source: Source,
+    layers: &[ShadowHair],
+    solids: &[Solid],
+    settings: &ShadowSettings,
+) -> Result<(Vec<Vec<f32>>, ShadowCounts), BadSource> {
+    let settings = settings.clamped();
+    let (mut projections, mut counts) = fit(source, layers, &settings)?;
+    let cells: Vec<Vec<AtomicU32>> =
+        layers.iter().map(|l| l.position.par_iter().map(|_| AtomicU32::new(1.0f32.to_bits())).collect()).collect();
+    for projection in &mut projections {
+        // Every face knows all that is masked.
+        counts.masked = 0;
+        face(projection, layers, &settings, &cells, &mut counts);
+    }
+    let mut out: Vec<Vec<f32>> =
+        cells.into_iter().map(|c| c.into_par_iter().map(|v| f32::from_bits(v.into_inner())).collect()).collect();
+    if let Some(projection) = projections.first() {
+        counts.behind_solid = solid::shade(projection, layers, solids, &mut out);
+    }
+    Ok((out, counts))
+}
+
+/// Writes what one map knows. Each point belongs to one tile of one map, so every cell is written once at most.
+fn face(
+    projection: &mut Projection,
+    layers: &[ShadowHair],
+    settings: &ShadowSettings,
+    cells: &[Vec<AtomicU32>],
+    counts: &mut ShadowCounts,
+) {
+    let (chunks, grid) = chunks(projection, layers);
+    let projection = &*projection;
+    for c in &chunks {
+        counts.masked += c.masked.len();
+        counts.points += c.receivers;
+        counts.segments += c.segments;
+        counts.pairs += c.list.len();
+        for &i in &c.masked {
+            cells[c.layer][i as usize].store(0, Ordering::Relaxed);
+        }
+    }
+    let worked: usize = (0..grid * grid)
+        .into_par_iter()
+        .map_init(
+            || tile::Work::new(projection, settings),
+            |work, t| usize::from(work.run(&chunks, layers, [t % grid, t / grid], t, cells)),
+        )
+        .sum();
+    counts.texels = projection.texels;
+    counts.tiles[0] += worked;
+    counts.tiles[1] += grid * grid;
+    let held: usize = chunks.iter().map(Chunk::bytes).sum();
+    counts.bytes = counts.bytes.max(held + volume::Volume::bytes(projection.filter, settings.slices));
+}
+
+impl ShadowHair<'_> {
+    /// Diameter at point `i`, finite and >= 0.
+    #[inline]
+    pub(crate) fn width(&self, i: usize) -> f32 {
+        self.width.get(i).copied().filter(|w| *w > 0.0 && *w < 1e15).unwrap_or(0.0)
+    }
+
+    /// Opacity of strand `s` at its point `i` (counted over all strands), in [0, 1].
+    #[inline]
+    pub(crate) fn opacity(&self, s: usize, i: usize) -> f32 {
+        let entry = if self.opacity.len() > self.offsets.len() { i } else { s };
+        let o = self.opacity.get(entry).copied().unwrap_or(1.0);
+        if o.is_nan() { 0.0 } else { o.clamp(0.0, 1.0) }
+    }
+
+    /// Point `i` in scene space.
+    #[inline]
+    pub(crate) fn point(&self, i: usize) -> Vec3 {
+        let p = self.position[i];
+        Vec3::from(self.origin) + Vec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]))
+    }
+}
