@@ -167,6 +167,7 @@ fn facts(path: &Path, frame: f64) -> ShotFacts {
         fps: 24.0,
         frames: vec![frame.round() as i32],
         origin: [0.0; 3],
+        lights: vec![],
         extra: vec![("generator".into(), concat!("pelage ", env!("CARGO_PKG_VERSION")).into())],
     }
 }

@@ -98,13 +98,18 @@ pub enum ShadowQuality {
     Reference,
 }
 
+/// A light's name as every format has it.
+pub fn column(name: &str) -> String {
+    name.replace('-', "_").to_ascii_lowercase()
+}
+
 impl Document<ShotFile> {
     /// Checks lights.
     pub(super) fn check_lights(&self) -> Result<(), ConfigError> {
         for (i, l) in self.value.light.iter().enumerate() {
             let at = format!("light[{i}]");
             self.check_light(&at, l)?;
-            if self.value.light[..i].iter().any(|o| o.name.eq_ignore_ascii_case(&l.name)) {
+            if self.value.light[..i].iter().any(|o| column(&o.name) == column(&l.name)) {
                 return Err(self.error(&format!("{at}.name"), "is used twice", "name every light differently"));
             }
         }
@@ -142,7 +147,11 @@ impl Document<ShotFile> {
                 return Err(self.error(&format!("{at}.{key}"), "is not read for this kind of light", "take it out"));
             }
             if wanted && !has {
-                return Err(self.error(at, format!("this kind of light needs `{key}`"), "three numbers, or key frames"));
+                return Err(self.error(
+                    at,
+                    format!("this kind of light needs `{key}`"),
+                    "three numbers, or key frames",
+                ));
             }
         }
         for (key, keyed) in [("direction", &l.direction), ("position", &l.position)] {

@@ -16,8 +16,8 @@ pub use groom::{
     Placement,
 };
 pub use groom::{Side, Space, WidthFeature, WrapMode};
-pub use light::{Light, LightKind, Shadow, ShadowQuality};
 pub use keyed::{Amount, Key, Keyed, Vector};
+pub use light::{Light, LightKind, Shadow, ShadowQuality};
 pub use look::{
     Clump, ClumpOf, Collision, Curl, CurlKind, CurlWave, Dilation, Emitter, Noise, Operator, Wave, WaveAxis, WaveShape,
     WindLook,

@@ -273,6 +273,7 @@ impl Document<ShotFile> {
         if !(1..=100).contains(&s.preview.sheet) {
             return bad("preview.sheet", "must be between 1 and 100 pictures", "");
         }
+        self.check_lights()?;
         self.check_simulate()
     }
 

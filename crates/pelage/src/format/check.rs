@@ -30,6 +30,8 @@ pub(super) struct ShotCheck {
     frames: Vec<i32>,
     written: usize,
     layers: Vec<LayerShape>,
+    /// Columns of transmittance.
+    shadows: usize,
 }
 
 impl ShotCheck {
@@ -45,7 +47,8 @@ impl ShotCheck {
         }
         let shape = |l: &HairLayer| LayerShape { name: l.name.clone(), offsets: l.offsets.clone(), id: l.id.clone() };
         let layers = layers.iter().map(shape).collect();
-        Ok(ShotCheck { path: path.to_path_buf(), frames: facts.frames.clone(), written: 0, layers })
+        let shadows = facts.shadow_columns().len();
+        Ok(ShotCheck { path: path.to_path_buf(), frames: facts.frames.clone(), written: 0, layers, shadows })
     }
 
     /// Checks that `frame` is the next one and has one entry a layer, with one value a point, all of them finite.
@@ -72,6 +75,20 @@ impl ShotCheck {
             for (what, count, expected, may_be_empty) in sizes {
                 if count != expected && !(may_be_empty && count == 0) {
                     return Err(bad(format!("layer {:?} has {count} {what}, expected {expected}", shape.name)));
+                }
+            }
+            if data.transmittance.len() != self.shadows {
+                let found = data.transmittance.len();
+                return Err(bad(format!("has {found} columns of transmittance, expected {}", self.shadows)));
+            }
+            for column in data.transmittance {
+                if column.len() != points {
+                    let what = format!("has {} values of transmittance, expected {points}", column.len());
+                    return Err(bad(format!("layer {:?} {what}", shape.name)));
+                }
+                if let Some(i) = column.iter().position(|t| !(0.0..=1.0).contains(t)) {
+                    let hair = shape.id[curve_of(&shape.offsets, i)];
+                    return Err(bad(format!("layer {:?}, hair {hair}: a transmittance is {}", shape.name, column[i])));
                 }
             }
             let scan = |what: &str, values: &[[f32; 3]]| match Bounds::of(values) {
@@ -266,6 +283,7 @@ pub(super) mod samples {
             fps: 24.0,
             frames: vec![1001, 1002, 1003],
             origin: [10.0, 0.5, -3.25],
+            lights: vec![],
             extra: vec![("groom".into(), "bust \"long\" é".into()), ("version".into(), "0.1.0".into())],
         };
         let layer = |name: &str, counts: &[usize], skin: bool| {
@@ -293,6 +311,18 @@ pub(super) mod samples {
         let (facts, mut layers) = shot();
         layers[0].color = layers[0].rest.iter().map(|p| p.map(|x| 0.5 + 0.5 * x)).collect();
         (facts, layers)
+    }
+
+    /// The shot with two lights.
+    pub(crate) fn lit() -> (ShotFacts, Vec<HairLayer>) {
+        let (facts, layers) = shot();
+        (ShotFacts { lights: vec!["key".into(), "rim-2".into()], ..facts }, layers)
+    }
+
+    /// Columns of transmittance of `layer` at `frame`.
+    pub(crate) fn light(layer: &HairLayer, frame: i32) -> Vec<Vec<f32>> {
+        let of = |c: usize| (0..layer.width.len()).map(|i| ((i + 3 * c + frame as usize) % 9) as f32 * 0.125).collect();
+        (0..3).map(of).collect()
     }
 
     /// Diameters and opacities of `layer` at `frame`, other than the layer's.
@@ -383,12 +413,27 @@ mod tests {
         let data: Vec<_> = layers.iter().map(|l| (samples::frame(l, 1001), samples::look(l, 1001))).collect();
         let of = |k: usize| {
             let ((position, velocity), (width, opacity)) = &data[k];
-            HairFrame { position, velocity, width, opacity }
+            HairFrame { position, velocity, width, opacity, transmittance: &[] }
         };
         fresh().frame(1001, &[of(0), of(1)]).unwrap();
         let error = |f: HairFrame| fresh().frame(1001, &[of(0), f]).unwrap_err().to_string();
         assert!(error(HairFrame { width: &[0.1; 4], ..of(1) }).contains("has 4 widths, expected 19"));
         assert!(error(HairFrame { opacity: &[0.1; 19], ..of(1) }).contains("has 19 opacities, expected 5"));
+        let lit = [vec![0.5; 19], vec![1.0; 19]];
+        assert!(error(HairFrame { transmittance: &lit, ..of(1) }).contains("2 columns of transmittance, expected 0"));
+        let (facts, layers) = samples::lit();
+        let mut lit: Vec<_> = layers.iter().map(|l| samples::light(l, 1001)).collect();
+        let run = |lit: &[Vec<Vec<f32>>]| {
+            let frame = |k: usize| HairFrame { transmittance: &lit[k], ..of(k) };
+            let mut check = ShotCheck::new(Path::new("x"), &facts, &layers).unwrap();
+            check.frame(1001, &[frame(0), frame(1)]).map(drop).map_err(|e| e.to_string())
+        };
+        run(&lit).unwrap();
+        lit[1][2][4] = 1.5;
+        let hair = layers[1].id[1];
+        assert!(run(&lit).unwrap_err().contains(&format!("hair {hair}: a transmittance is 1.5")));
+        lit[1][2].pop();
+        assert!(run(&lit).unwrap_err().contains("18 values of transmittance, expected 19"));
         let mut width = data[1].1.0.clone();
         width[4] = -0.5;
         let hair = layers[1].id[1];

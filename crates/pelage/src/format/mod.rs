@@ -59,6 +59,8 @@ pub struct ShotFacts {
     pub frames: Vec<i32>,
     /// Scene-space point that all positions are relative to (usually zero).
     pub origin: [f64; 3],
+    /// Names of the lights whose transmittance frames have, in the order of its columns: letters, digits, `_`, `-`.
+    pub lights: Vec<String>,
     /// Further facts as (name, value): version, groom, hash of the configuration.
     pub extra: Vec<(String, String)>,
 }
@@ -88,6 +90,14 @@ pub struct HairLayer {
     pub opacity: Vec<f32>,
 }
 
+impl ShotFacts {
+    /// Names of the columns of transmittance.
+    pub fn shadow_columns(&self) -> Vec<String> {
+        let each = self.lights.iter().map(|l| format!("transmittance:{l}"));
+        if self.lights.is_empty() { vec![] } else { std::iter::once("transmittance".to_owned()).chain(each).collect() }
+    }
+}
+
 impl HairLayer {
     /// Whether it has a colour for each point, not for each curve. (A curve has two points or more, so that a count
     /// says which; a layer without curves has none of either.)
@@ -108,4 +118,7 @@ pub struct HairFrame<'a> {
     pub width: &'a [f32],
     /// Opacities at this frame in [0, 1], C; empty: those of the layer.
     pub opacity: &'a [f32],
+    /// The part of the light that arrives, in [0, 1], V values each: of all lights together, then of each light of the
+    /// facts. Empty if the facts name none.
+    pub transmittance: &'a [Vec<f32>],
 }

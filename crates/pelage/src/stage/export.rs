@@ -1,9 +1,10 @@
 //! Export: finished hair for other programs. Every file is written beside its place, read back and checked, and only
 //! then renamed.
 
+use super::plan_light::written_lights;
 use super::plan_look::{finished_rest, is_wet};
 use super::run::{Counts, Runner};
-use super::{Step, What, curves, groom, instance, interpolate};
+use super::{Step, What, curves, groom, instance, interpolate, shadow};
 use crate::Error;
 use crate::config::{ExportFormat, UpAxis};
 use crate::files::unfinished;
@@ -76,6 +77,8 @@ impl Drop for Parts {
 /// Facts of the shot that every file states.
 pub fn facts(run: &mut Runner<'_>) -> Result<ShotFacts, Error> {
     let origin = run.origin()?;
+    let lights =
+        written_lights(run.project).into_iter().map(|l| run.project.shot.value.light[l].name.clone()).collect();
     let shot = &run.project.shot.value.shot;
     Ok(ShotFacts {
         name: shot.name.clone(),
@@ -84,6 +87,7 @@ pub fn facts(run: &mut Runner<'_>) -> Result<ShotFacts, Error> {
         fps: shot.fps,
         frames: run.project.frames.keys().copied().collect(),
         origin,
+        lights,
         extra: vec![("generator".into(), concat!("pelage ", env!("CARGO_PKG_VERSION")).into())],
     })
 }
@@ -94,6 +98,25 @@ fn hair_layer(run: &mut Runner<'_>, i: usize) -> Result<HairLayer, Error> {
     Ok(HairLayer { rest: interpolate::positions(run, rest)?, ..look(run, i)? })
 }
 
+/// How thick and how opaque a layer's hairs are, and nothing else of them.
+pub fn thickness(run: &mut Runner<'_>, i: usize) -> Result<HairLayer, Error> {
+    if run.project.curves.is_some() {
+        return curves::look(run);
+    }
+    let layer = &run.project.groom.value.layer[i];
+    let width = instance::column(run, What::Width(i), i)?;
+    let opacity = instance::column(run, What::Opacity(i), i)?;
+    let offsets = Offsets::uniform(width.len(), run.project.points(i));
+    let unit_per_micrometre = (1e-6 / run.project.shot.value.shot.meters_per_unit) as f32;
+    let width: Vec<f32> = width.iter().map(|w| w * unit_per_micrometre).collect();
+    Ok(HairLayer {
+        width: point_widths(&width, &offsets, &layer.width.stations()),
+        opacity: opacity.iter().map(|o| o.clamp(0.0, 1.0)).collect(),
+        offsets,
+        ..HairLayer::default()
+    })
+}
+
 /// A layer's hairs without any positions.
 pub fn look(run: &mut Runner<'_>, i: usize) -> Result<HairLayer, Error> {
     if run.project.curves.is_some() {
@@ -101,13 +124,8 @@ pub fn look(run: &mut Runner<'_>, i: usize) -> Result<HairLayer, Error> {
     }
     let skin = groom::skin(run)?;
     let roots = instance::roots(run, i)?;
-    let width = instance::column(run, What::Width(i), i)?;
-    let opacity = instance::column(run, What::Opacity(i), i)?;
-    let color = instance::color(run, i)?;
+    let (thickness, color) = (thickness(run, i)?, instance::color(run, i)?);
     let layer = &run.project.groom.value.layer[i];
-    let offsets = Offsets::uniform(roots.id.len(), run.project.points(i));
-    let unit_per_micrometre = (1e-6 / run.project.shot.value.shot.meters_per_unit) as f32;
-    let width: Vec<f32> = width.iter().map(|w| w * unit_per_micrometre).collect();
     Ok(HairLayer {
         name: layer.name.clone(),
         skin_face: roots.root.iter().map(|p| skin.mesh.face[p.triangle as usize] as i32).collect(),
@@ -115,13 +133,11 @@ pub fn look(run: &mut Runner<'_>, i: usize) -> Result<HairLayer, Error> {
         id: roots.id.clone(),
         root_uv: roots.uv.clone(),
         rest: Vec::new(),
-        width: point_widths(&width, &offsets, &layer.width.stations()),
         color: match layer.color.stations() {
-            Some(ramp) => point_colors(&color, &offsets, &ramp),
+            Some(ramp) => point_colors(&color, &thickness.offsets, &ramp),
             None => color,
         },
-        opacity: opacity.iter().map(|o| o.clamp(0.0, 1.0)).collect(),
-        offsets,
+        ..thickness
     })
 }
 
@@ -197,9 +213,16 @@ fn frames(
             }
         }
         let wet: Vec<(Vec<f32>, Vec<f32>)> = now.iter().zip(&looks).map(|(h, l)| h.wet_columns(l.as_ref())).collect();
-        let layers = now.iter().zip(&velocity).zip(&wet);
+        let lit = shadow::written(run, frame, &now.iter().map(|h| h.position.len()).collect::<Vec<_>>())?;
+        let layers = now.iter().zip(&velocity).zip(&wet).zip(&lit);
         let hair: Vec<HairFrame<'_>> = layers
-            .map(|((h, velocity), (width, opacity))| HairFrame { position: &h.position, velocity, width, opacity })
+            .map(|(((h, velocity), (width, opacity)), transmittance)| HairFrame {
+                position: &h.position,
+                velocity,
+                width,
+                opacity,
+                transmittance,
+            })
             .collect();
         write(frame, &hair)?;
         now = next.unwrap_or_default();

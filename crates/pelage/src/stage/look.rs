@@ -111,8 +111,20 @@ pub fn finish(
 /// A skin with its holes closed, and the structure over its rest pose.
 #[derive(Debug)]
 pub struct Barrier {
-    closed: Closed,
+    /// The mesh.
+    pub closed: Closed,
     rest: Bvh,
+}
+
+/// The skin with its holes closed.
+pub fn barrier(run: &mut Runner<'_>) -> Result<Rc<Barrier>, Error> {
+    if let Some(found) = &run.barrier {
+        return Ok(found.clone());
+    }
+    let skin = groom::skin(run)?;
+    let closed = Closed::new(&skin.mesh, &skin.topology);
+    let rest = closed.bvh(&closed.extend(&skin.mesh.position));
+    Ok(run.barrier.insert(Rc::new(Barrier { closed, rest })).clone())
 }
 
 /// Pushes finished hairs out of the skin, to the side that they came `from` before they were displaced.
@@ -125,15 +137,7 @@ fn collide(
     position: &mut [[f32; 3]],
     counts: &mut Counts,
 ) -> Result<(), Error> {
-    let skin = groom::skin(run)?;
-    let barrier = match &run.barrier {
-        Some(found) => found.clone(),
-        None => {
-            let closed = Closed::new(&skin.mesh, &skin.topology);
-            let rest = closed.bvh(&closed.extend(&skin.mesh.position));
-            run.barrier.insert(Rc::new(Barrier { closed, rest })).clone()
-        }
-    };
+    let (skin, barrier) = (groom::skin(run)?, barrier(run)?);
     let posed;
     let (bvh, motion) = match at {
         SkinAt::Rest => (&barrier.rest, None),

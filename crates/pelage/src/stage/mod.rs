@@ -6,6 +6,7 @@ mod body;
 mod clumps;
 mod look;
 mod plan;
+mod plan_light;
 mod plan_look;
 mod plan_simulate;
 mod run;
@@ -17,6 +18,7 @@ pub mod groom;
 pub mod instance;
 pub mod interpolate;
 pub mod preview;
+pub mod shadow;
 pub mod simulate;
 pub mod tables;
 
@@ -36,6 +38,8 @@ pub enum Stage {
     Simulate,
     /// Every hair at every frame.
     Interpolate,
+    /// Light that arrives at every point of every hair.
+    Shadow,
     /// Files for other programs.
     Export,
     /// Pictures.
@@ -44,8 +48,15 @@ pub enum Stage {
 
 impl Stage {
     /// All stages in order.
-    pub const ALL: [Stage; 6] =
-        [Stage::Groom, Stage::Instance, Stage::Simulate, Stage::Interpolate, Stage::Export, Stage::Preview];
+    pub const ALL: [Stage; 7] = [
+        Stage::Groom,
+        Stage::Instance,
+        Stage::Simulate,
+        Stage::Interpolate,
+        Stage::Shadow,
+        Stage::Export,
+        Stage::Preview,
+    ];
 
     /// Name as typed on the command line.
     pub fn name(self) -> &'static str {
@@ -54,6 +65,7 @@ impl Stage {
             Stage::Instance => "instance",
             Stage::Simulate => "simulate",
             Stage::Interpolate => "interpolate",
+            Stage::Shadow => "shadow",
             Stage::Export => "export",
             Stage::Preview => "preview",
         }

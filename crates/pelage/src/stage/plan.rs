@@ -1,6 +1,7 @@
 //! Every step of a shot with its recipe: what each step reads, and nothing else, enters its key.
 
 use super::Stage;
+use super::plan_light::is_shadowed;
 use super::plan_look::finished_rest;
 use crate::cache::{Field, Recipe};
 use crate::config::{Comb, ExportFormat, Feature, MapRef, Parting, Target};
@@ -43,6 +44,8 @@ pub enum What {
     Simulate(usize, u32),
     /// A layer's hairs at a frame.
     Frame(usize, i32),
+    /// What of a light arrives at the hairs of a frame.
+    Shadow(u32, i32),
     /// An exported file, or one per frame.
     Export(ExportFormat),
     /// The preview picture.
@@ -89,6 +92,7 @@ pub(super) mod version {
     pub const LOOK: u32 = 1;
     pub const COLLISION: u32 = 2;
     pub const AREAS: u32 = 1;
+    pub const SHADOW: u32 = 1;
     pub const EXPORT: u32 = 1;
     pub const PREVIEW: u32 = 2;
 }
@@ -133,6 +137,7 @@ impl Plan {
             for i in 0..project.groom.value.layer.len() {
                 plan.add_frame(&r, i, *frame, at, What::Simulate(i, timeline.stretch_of(*frame)));
             }
+            plan.add_shadows(&r, *frame, at);
         }
         let layers = 0..project.groom.value.layer.len();
         let columns = layers.clone().flat_map(|i| [What::Width(i), What::Opacity(i), What::Color(i)]);
@@ -140,13 +145,20 @@ impl Plan {
         let mut all = look.clone();
         all.extend(layers.clone().map(|i| finished_rest(project, i)));
         all.extend(project.frames.keys().flat_map(|f| layers.clone().map(|i| What::Frame(i, *f))));
+        let shadows = |frame: i32, written: bool| {
+            let all = 0..project.shot.value.light.len();
+            let of = move |l: usize| is_shadowed(project, l, frame, written).then_some(What::Shadow(l as u32, frame));
+            all.filter_map(of).collect::<Vec<What>>()
+        };
+        all.extend(project.frames.keys().flat_map(|f| shadows(*f, true)));
         for format in &project.shot.value.export.formats {
             let name = format!("export/{}", format.name());
             plan.add(What::Export(*format), name, Stage::Export, r.export(*format), &all);
         }
         let of = |frames: &[i32]| {
-            let frames = frames.iter().flat_map(|f| layers.clone().map(|i| What::Frame(i, *f)));
-            look.iter().copied().chain(frames).collect::<Vec<What>>()
+            let hairs = frames.iter().flat_map(|f| layers.clone().map(|i| What::Frame(i, *f)));
+            let shadows = frames.iter().flat_map(|f| shadows(*f, false));
+            look.iter().copied().chain(hairs).chain(shadows).collect::<Vec<What>>()
         };
         let still = of(&[project.still_frame()]);
         let picture = r.picture().param("frame", project.still_frame(), r.in_shot("preview.frame"));
@@ -279,7 +291,7 @@ impl What {
     /// The frame that it is made for; `None` for what is made once.
     pub fn frame(self) -> Option<i32> {
         match self {
-            What::Frame(_, f) | What::Hits(f) => Some(f),
+            What::Frame(_, f) | What::Hits(f) | What::Shadow(_, f) => Some(f),
             _ => None,
         }
     }
@@ -291,7 +303,7 @@ impl What {
             What::Simulate(i, _) | What::Frame(i, _) | What::Clump(i, _) => Some(i),
             What::Length(i) | What::Width(i) | What::Opacity(i) | What::Color(i) => Some(i),
             What::Curves | What::Place | What::Comb | What::Hits(_) => None,
-            What::Export(_) | What::Still | What::Sheet => None,
+            What::Shadow(..) | What::Export(_) | What::Still | What::Sheet => None,
         }
     }
 }
@@ -462,16 +474,25 @@ impl<'a> Reader<'a> {
     }
 
     /// What makes columns of points of a layer's columns of hairs: it is read where points are written or drawn.
-    fn along(&self, mut r: Recipe) -> Recipe {
+    fn along(&self, r: Recipe) -> Recipe {
+        let mut r = self.widths(r);
+        for (i, layer) in self.project.groom.value.layer.iter().enumerate() {
+            if let Some(ramp) = &layer.color.ramp {
+                let at = format!("layer[{i}].color.ramp");
+                r = r.param(&at, format!("{ramp:?}"), self.in_groom(&at));
+            }
+        }
+        r
+    }
+
+    /// What makes widths of points.
+    pub(super) fn widths(&self, mut r: Recipe) -> Recipe {
         for (i, layer) in self.project.groom.value.layer.iter().enumerate() {
             let at = |key: &str| format!("layer[{i}].{key}");
             r = match &layer.width.profile {
                 Some(p) => r.param(&at("width.profile"), format!("{p:?}"), self.in_groom(&at("width.profile"))),
                 None => r.param(&at("width.tip"), layer.width.tip(), self.in_groom(&at("width.tip"))),
             };
-            if let Some(ramp) = &layer.color.ramp {
-                r = r.param(&at("color.ramp"), format!("{ramp:?}"), self.in_groom(&at("color.ramp")));
-            }
         }
         r
     }
@@ -539,7 +560,7 @@ impl<'a> Reader<'a> {
         ] {
             r = r.param(key, value, self.in_shot(&format!("shot.{key}")));
         }
-        self.along(r)
+        self.lights_of_files(self.along(r))
     }
 
     fn picture(&self) -> Recipe {
@@ -550,6 +571,10 @@ impl<'a> Reader<'a> {
         {
             r = r.param(key, value, self.in_shot(&format!("preview.{key}")));
         }
-        self.along(r).param("up", format!("{:?}", self.project.shot.value.shot.up), self.in_shot("shot.up"))
+        self.lights_of_pictures(self.along(r)).param(
+            "up",
+            format!("{:?}", self.project.shot.value.shot.up),
+            self.in_shot("shot.up"),
+        )
     }
 }

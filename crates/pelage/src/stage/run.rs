@@ -1,5 +1,6 @@
 //! Brings a shot up to date: walks the plan, runs what is not in the cache, and says why.
 
+use super::plan_light::is_shadowed;
 use super::{Plan, Stage, Step, What, skin};
 use crate::Error;
 use crate::cache::{Entry, FileHashes, Recipe, Store};
@@ -70,6 +71,8 @@ pub struct Runner<'a> {
     pub(super) barrier: Option<Rc<super::look::Barrier>>,
     /// Particles of emitters that have a file.
     pub(super) particles: BTreeMap<usize, Rc<Vec<pelage_groom::areas::Particle>>>,
+    /// Solids at the frame whose shadows were made last.
+    pub(super) solids: Option<(i32, Rc<Vec<super::shadow::Shade>>)>,
     pub(super) hits: Option<(i32, Rc<super::areas::Hits>)>,
     pub(super) placed: Option<pelage_groom::control::ControlHairs>,
     pub(super) control: Option<Rc<pelage_groom::control::ControlHairs>>,
@@ -113,6 +116,7 @@ impl<'a> Runner<'a> {
             looks: BTreeMap::new(),
             barrier: None,
             particles: BTreeMap::new(),
+            solids: None,
             hits: None,
             placed: None,
             control: None,
@@ -219,6 +223,12 @@ impl<'a> Runner<'a> {
     fn selected(&self, stage: Stage) -> Vec<Step> {
         let wanted = |s: &&Step| match s.what {
             What::Frame(_, f) => self.options.frames.as_ref().is_none_or(|o| o.contains(&f)),
+            What::Shadow(l, f) => {
+                let project = self.project;
+                let used =
+                    is_shadowed(project, l as usize, f, true) || self.options.sheet || f == project.still_frame();
+                used && self.options.frames.as_ref().is_none_or(|o| o.contains(&f))
+            }
             What::Hits(f) => self.options.frames.as_ref().is_none_or(|o| o.last().is_some_and(|last| f <= *last)),
             What::Simulate(_, k) => {
                 let last = self.options.frames.as_ref().map(|o| o.last().copied().unwrap_or(i32::MIN));
@@ -259,7 +269,7 @@ impl<'a> Runner<'a> {
     /// Frames that a step makes.
     fn frames_of(&self, step: &Step) -> Vec<i32> {
         match step.what {
-            What::Frame(_, f) => vec![f],
+            What::Frame(_, f) | What::Shadow(_, f) => vec![f],
             What::Simulate(_, k) => Timeline::new(self.project).stretch(k).map(|f| f as i32).collect(),
             _ => Vec::new(),
         }
@@ -296,7 +306,9 @@ impl<'a> Runner<'a> {
     /// Frames that a whole-shot file still waits for.
     fn waits_for(&self, step: &Step) -> Vec<i32> {
         let absent = |w: &What| match w {
-            What::Frame(_, f) if !self.store.contains(&self.plan.step(*w).recipe.key()) => Some(*f),
+            What::Frame(_, f) | What::Shadow(_, f) if !self.store.contains(&self.plan.step(*w).recipe.key()) => {
+                Some(*f)
+            }
             _ => None,
         };
         let frames: BTreeSet<i32> = step.reads.iter().filter_map(absent).collect();
@@ -430,7 +442,7 @@ impl<'a> Runner<'a> {
     }
 
     fn make(&mut self, what: What) -> Result<(), Error> {
-        use super::{areas, clumps, curves, export, groom, instance, interpolate, preview, simulate};
+        use super::{areas, clumps, curves, export, groom, instance, interpolate, preview, shadow, simulate};
         match what {
             What::Curves => curves::hair(self).map(drop),
             What::Place => groom::placed(self).map(drop),
@@ -444,6 +456,7 @@ impl<'a> Runner<'a> {
             What::Clump(i, k) => clumps::clumps(self, i, k as usize).map(drop),
             What::Hits(frame) => areas::hits(self, frame).map(drop),
             What::Rest(_) | What::Finished(_) | What::Frame(..) => interpolate::positions(self, what).map(drop),
+            What::Shadow(l, frame) => shadow::columns(self, l as usize, frame).map(drop),
             What::Export(format) => export::write(self, what, format),
             What::Still => preview::still(self),
             What::Sheet => preview::sheet(self),
@@ -466,6 +479,6 @@ fn tally(stage: Stage, ran: &[&Step], done: &[&Step]) -> (usize, usize) {
             let rest = usize::from(new.is_empty() && !ran.is_empty() && !old.is_empty());
             (new.len() + rest, old.len() - rest)
         }
-        Stage::Simulate | Stage::Export | Stage::Preview => (ran.len(), done.len()),
+        Stage::Simulate | Stage::Shadow | Stage::Export | Stage::Preview => (ran.len(), done.len()),
     }
 }

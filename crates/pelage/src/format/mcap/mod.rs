@@ -37,6 +37,9 @@ const CHECKSUM: &str = "crc32";
 /// Chunks end after the message that makes them longer than this, so that a large frame is a chunk of its own.
 const CHUNK: u64 = 1 << 20;
 
+/// Entry of the facts with the names of the lights, where there are some.
+const LIGHTS: &str = "lights";
+
 /// Time of frame number `frame` in nanoseconds since the first one.
 fn log_time(facts: &ShotFacts, frame: i32) -> u64 {
     let first = facts.frames.first().copied().unwrap_or(frame);
@@ -59,7 +62,9 @@ fn facts_to_map(facts: &ShotFacts, layers: usize) -> BTreeMap<String, String> {
         ("velocities", "scene units per second".to_string()),
     ];
     let extra = facts.extra.iter().map(|(k, v)| (format!("extra.{k}"), v.clone()));
-    let mut map: BTreeMap<String, String> = own.into_iter().map(|(k, v)| (k.to_owned(), v)).chain(extra).collect();
+    let lights = (!facts.lights.is_empty()).then(|| (LIGHTS, list(&facts.lights)));
+    let own = own.into_iter().chain(lights);
+    let mut map: BTreeMap<String, String> = own.map(|(k, v)| (k.to_owned(), v)).chain(extra).collect();
     map.insert(CHECKSUM.to_owned(), checksum(&map));
     map
 }
@@ -102,6 +107,7 @@ fn facts_from_map(map: &BTreeMap<String, String>) -> Result<(ShotFacts, usize), 
         fps: positive("fps")?,
         frames,
         origin: origin.try_into().map_err(|_| format!("the origin in the record {SHOT} is not three numbers"))?,
+        lights: map.get(LIGHTS).map_or(vec![], |l| l.split(' ').map(str::to_owned).collect()),
         extra: extra.collect(),
     };
     Ok((facts, parse("layers", text("layers")?)?))

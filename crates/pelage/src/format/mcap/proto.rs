@@ -49,9 +49,14 @@ const FRAME_FIELDS: [Field; 5] = [
     ("velocity", Kind::Float, true),
 ];
 
-/// What a frame has instead of the layer's columns: frame, width (V, or none), opacity (C, or none).
-const LOOK_FIELDS: [Field; 3] =
-    [("frame", Kind::Int32, false), ("width", Kind::Float, true), ("opacity", Kind::Float, true)];
+/// What a frame has beside or instead of the layer's columns: frame, width (V, or none), opacity (C, or none),
+/// transmittance (V of all lights together and V of each light, or none).
+const LOOK_FIELDS: [Field; 4] = [
+    ("frame", Kind::Int32, false),
+    ("width", Kind::Float, true),
+    ("opacity", Kind::Float, true),
+    ("transmittance", Kind::Float, true),
+];
 
 /// Builds a protobuf message in a buffer.
 #[derive(Default)]
@@ -150,13 +155,19 @@ pub(super) fn encode_frame(out: &mut Vec<u8>, frame: i32, time: f64, origin: &[f
     *out = writer.0;
 }
 
-/// Widths and opacities of a frame as a `HairLook` message, in `out`, whose memory is used again.
+/// Widths, opacities and transmittance of a frame as a `HairLook` message, in `out`, whose memory is used again.
 pub(super) fn encode_look(out: &mut Vec<u8>, frame: i32, data: &HairFrame) {
     out.clear();
     let mut writer = Writer(std::mem::take(out));
     writer.number(1, i64::from(frame) as u64);
     writer.packed(2, data.width);
     writer.packed(3, data.opacity);
+    let values: usize = data.transmittance.iter().map(Vec::len).sum();
+    if values > 0 {
+        writer.varint(4 << 3 | 2);
+        writer.varint(4 * values as u64);
+        data.transmittance.iter().for_each(|c| writer.0.extend_from_slice(bytemuck::cast_slice(c)));
+    }
     *out = writer.0;
 }
 
@@ -271,14 +282,24 @@ pub(super) fn decode_frame(message: &[u8]) -> Result<Frame, Broken> {
     Ok(out)
 }
 
-/// Decodes a `HairLook` message: frame, widths, opacities.
-pub(super) fn decode_look(message: &[u8]) -> Result<(i32, Vec<f32>, Vec<f32>), Broken> {
-    let mut out = (0, vec![], vec![]);
+/// A decoded `HairLook` message.
+#[derive(Debug, Default, PartialEq)]
+pub(super) struct Look {
+    pub(super) frame: i32,
+    pub(super) width: Vec<f32>,
+    pub(super) opacity: Vec<f32>,
+    pub(super) transmittance: Vec<f32>,
+}
+
+/// Decodes a `HairLook` message.
+pub(super) fn decode_look(message: &[u8]) -> Result<Look, Broken> {
+    let mut out = Look::default();
     fields(message, |field, value| {
         match (field, value) {
-            (1, Value::Number(n)) => out.0 = n as i32,
-            (2, Value::Bytes(b)) => unpack(&mut out.1, b)?,
-            (3, Value::Bytes(b)) => unpack(&mut out.2, b)?,
+            (1, Value::Number(n)) => out.frame = n as i32,
+            (2, Value::Bytes(b)) => unpack(&mut out.width, b)?,
+            (3, Value::Bytes(b)) => unpack(&mut out.opacity, b)?,
+            (4, Value::Bytes(b)) => unpack(&mut out.transmittance, b)?,
             _ => {}
         }
         Ok(())
@@ -298,9 +319,19 @@ mod tests {
         }
         let (position, velocity) = (vec![[1.0, 2.0, 3.0], [-4.0, 5.5, 6.0]], vec![[0.0; 3]; 2]);
         let mut bytes = vec![1, 2, 3];
-        let data = HairFrame { position: &position, velocity: &velocity, width: &[0.5, 0.25], opacity: &[0.75] };
+        let light = [vec![0.25, 0.5], vec![0.75, 1.0]];
+        let (width, opacity) = (vec![0.5, 0.25], vec![0.75]);
+        let data = HairFrame {
+            position: &position,
+            velocity: &velocity,
+            width: &width,
+            opacity: &opacity,
+            transmittance: &light,
+        };
         encode_look(&mut bytes, -7, &data);
-        assert_eq!(decode_look(&bytes).unwrap(), (-7, vec![0.5, 0.25], vec![0.75]));
+        let transmittance = light.concat();
+        let look = Look { frame: -7, width: width.clone(), opacity: opacity.clone(), transmittance };
+        assert_eq!(decode_look(&bytes).unwrap(), look);
         encode_frame(&mut bytes, -5, 0.125, &[1.0, 0.0, 2.0], &data);
         let back = decode_frame(&bytes).unwrap();
         assert_eq!(back, Frame { frame: -5, time: 0.125, origin: vec![1.0, 0.0, 2.0], position, velocity });

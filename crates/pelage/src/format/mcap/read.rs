@@ -57,6 +57,8 @@ pub struct McapFrame {
     pub width: Vec<f32>,
     /// Opacities at this frame, C; empty: those of the layer.
     pub opacity: Vec<f32>,
+    /// Transmittance, V values of all lights together and then of each light of the facts; empty without lights.
+    pub transmittance: Vec<Vec<f32>>,
 }
 
 /// Opens a file that [`McapHair`](super::McapHair) wrote: reads its index and its facts.
@@ -130,21 +132,29 @@ impl HairMcap {
                     velocity: read.velocity,
                     width: vec![],
                     opacity: vec![],
+                    transmittance: vec![],
                 }),
                 _ => Err("its number, origin or sizes are wrong".into()),
             }
         })?;
         if let Some(place) = look {
             let points = frame.position.len();
-            (frame.width, frame.opacity) =
-                self.message(layer, place, &format!("look of frame {number}"), |sequence, message| {
-                    let (found, width, opacity) = proto::decode_look(message)?;
-                    let sized = width.is_empty() || width.len() == points;
-                    if found != number || sequence != number as u32 || !sized {
-                        return Err("its number or sizes are wrong".into());
-                    }
-                    Ok((width, opacity))
-                })?;
+            let columns = if self.facts.lights.is_empty() { 0 } else { 1 + self.facts.lights.len() };
+            let look = self.message(layer, place, &format!("look of frame {number}"), |sequence, message| {
+                let look = proto::decode_look(message)?;
+                let sized = look.width.is_empty() || look.width.len() == points;
+                let lit = look.transmittance.len() == columns * points;
+                if look.frame != number || sequence != number as u32 || !sized || !lit {
+                    return Err("its number or sizes are wrong".into());
+                }
+                Ok(look)
+            })?;
+            frame.transmittance = match columns {
+                0 => vec![],
+                _ if points == 0 => vec![vec![]; columns],
+                _ => look.transmittance.chunks(points).map(<[f32]>::to_vec).collect(),
+            };
+            (frame.width, frame.opacity) = (look.width, look.opacity);
         }
         Ok(frame)
     }
@@ -308,12 +318,15 @@ pub fn verify_frames(path: &Path, facts: &ShotFacts, sizes: &[[usize; 2]]) -> Re
             let look = [(frame.width.len(), *points), (frame.opacity.len(), *curves)];
             let sized = frame.position.len() == *points
                 && frame.origin == facts.origin
-                && look.iter().all(|(n, wanted)| *n == 0 || n == wanted);
+                && look.iter().all(|(n, wanted)| *n == 0 || n == wanted)
+                && frame.transmittance.len() == facts.shadow_columns().len();
             let finite = Bounds::of(&frame.position).is_some() && Bounds::of(&frame.velocity).is_some();
-            let sound = frame.width.iter().all(|w| is_width(*w)) && frame.opacity.iter().all(|x| x.is_finite());
+            let sound = frame.width.iter().all(|w| is_width(*w))
+                && frame.opacity.iter().all(|x| x.is_finite())
+                && frame.transmittance.iter().flatten().all(|t| (0.0..=1.0).contains(t));
             if !sized || !finite || !sound {
                 let what = if sized {
-                    "a value is not finite, or a width is negative"
+                    "a value is not finite or out of range"
                 } else {
                     "the number of points or curves, or the origin, is wrong"
                 };
@@ -372,9 +385,16 @@ mod tests {
             for (k, &number) in facts.frames.iter().enumerate() {
                 let (position, velocity) = samples::frame(layer, number);
                 let time = f64::from(number - 1001) / 24.0;
-                let (width, opacity) = (vec![], vec![]);
-                let expected =
-                    McapFrame { frame: number, time, origin: facts.origin, position, velocity, width, opacity };
+                let expected = McapFrame {
+                    frame: number,
+                    time,
+                    origin: facts.origin,
+                    position,
+                    velocity,
+                    width: vec![],
+                    opacity: vec![],
+                    transmittance: vec![],
+                };
                 assert_eq!(file.frame(k, i).unwrap(), expected);
             }
         }
@@ -436,6 +456,37 @@ mod tests {
             (look.topic.as_str(), look.schema.as_str(), look.messages),
             ("/hair/2nd/look", "pelage.HairLook", 2)
         );
+    }
+
+    #[test]
+    fn transmittance_is_read_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let (facts, layers) = samples::lit();
+        let path = dir.path().join("a.mcap");
+        let mut out = McapHair::create(&path, &facts, &layers).unwrap();
+        for &frame in &facts.frames {
+            let data: Vec<_> = layers.iter().map(|l| (samples::frame(l, frame), samples::light(l, frame))).collect();
+            let data: Vec<_> = data
+                .iter()
+                .map(|((position, velocity), transmittance)| HairFrame {
+                    position,
+                    velocity,
+                    transmittance,
+                    ..HairFrame::default()
+                })
+                .collect();
+            out.write_frame(frame, &data).unwrap();
+        }
+        out.finish().unwrap();
+        verify_layers(&path, &facts, &layers).unwrap();
+        verify_frames(&path, &facts, &sizes(&layers)).unwrap();
+        let mut file = read_hair_mcap(&path).unwrap();
+        assert_eq!(file.facts().lights, ["key", "rim-2"]);
+        for (l, layer) in layers.iter().enumerate() {
+            for (k, &frame) in facts.frames.iter().enumerate() {
+                assert_eq!(file.frame(k, l).unwrap().transmittance, samples::light(layer, frame));
+            }
+        }
     }
 
     #[test]

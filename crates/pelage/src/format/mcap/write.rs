@@ -87,7 +87,7 @@ impl McapHair {
         for (i, data) in layers.iter().enumerate() {
             proto::encode_frame(&mut buffer, frame, time, &self.facts.origin, data);
             self.write_message(self.channels[i], frame, &buffer)?;
-            if !data.width.is_empty() || !data.opacity.is_empty() {
+            if !(data.width.is_empty() && data.opacity.is_empty() && data.transmittance.is_empty()) {
                 let channel = self.look_channel(i)?;
                 proto::encode_look(&mut buffer, frame, data);
                 self.write_message(channel, frame, &buffer)?;

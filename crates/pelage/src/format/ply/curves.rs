@@ -33,7 +33,8 @@ const MARK: &str = "pelage hair 1";
 /// Writes one frame of hair: element `vertex` with `x y z` (scene units), velocities `vx vy vz` (scene units a second)
 /// and `width` (diameter, scene units), element `hair` with the range of its points (`first`, `count`), `id_lo`,
 /// `id_hi`, `layer`, and where a layer has them root `u v`, linear `r g b` and `opacity`. If a layer has a colour for
-/// each point, `r g b` of all layers are properties of `vertex` instead. Widths and opacities are those of the frame
+/// each point, `r g b` of all layers are properties of `vertex` instead. Where the facts name lights, vertices have
+/// `transmittance` of all lights together and `transmittance_NAME` of each. Widths and opacities are those of the frame
 /// where it has its own. The units stand in the comments. Positions are 32-bit, or 64-bit and absolute where the shot has an origin.
 pub fn write_hair(
     path: &Path,
@@ -41,7 +42,7 @@ pub fn write_hair(
     layers: &[HairLayer],
     frame: &[HairFrame<'_>],
 ) -> Result<(), FormatError> {
-    check_sizes(path, layers, frame)?;
+    check_sizes(path, facts, layers, frame)?;
     write_whole(path, |out| write_tables(out, &comments(facts, layers), &tables(facts, layers, frame)))
 }
 
@@ -65,11 +66,17 @@ pub fn verify_hair(
     Err(FormatError::new(path, what).at(at).hint("the file is not what was exported: export it again"))
 }
 
-fn check_sizes(path: &Path, layers: &[HairLayer], frame: &[HairFrame<'_>]) -> Result<(), FormatError> {
+fn check_sizes(
+    path: &Path,
+    facts: &ShotFacts,
+    layers: &[HairLayer],
+    frame: &[HairFrame<'_>],
+) -> Result<(), FormatError> {
     let wrong = |what: String| Err(FormatError::new(path, what));
     if layers.len() != frame.len() {
         return wrong(format!("{} layers but {} frames of layers", layers.len(), frame.len()));
     }
+    let shadows = facts.shadow_columns().len();
     for (l, f) in layers.iter().zip(frame) {
         let (curves, points) = (l.offsets.len(), l.offsets.total());
         let exact = [
@@ -85,6 +92,9 @@ fn check_sizes(path: &Path, layers: &[HairLayer], frame: &[HairFrame<'_>]) -> Re
             ("width of the frame", f.width.len(), points),
             ("opacity of the frame", f.opacity.len(), curves),
         ];
+        if f.transmittance.len() != shadows || f.transmittance.iter().any(|c| c.len() != points) {
+            return wrong(format!("layer '{}': wrong columns of transmittance, expected {shadows}", l.name));
+        }
         let bad = exact.iter().find(|c| c.1 != c.2).or_else(|| optional.iter().find(|c| c.1 != c.2 && c.1 != 0));
         if let Some((name, found, expected)) = bad {
             return wrong(format!("layer '{}': {found} values of {name}, expected {expected}", l.name));
@@ -132,6 +142,10 @@ fn vertex_table<'a>(facts: &ShotFacts, layers: &'a [HairLayer], frame: &[HairFra
     }
     let width = |(l, f): (&'a HairLayer, &HairFrame<'a>)| if f.width.is_empty() { &l.width[..] } else { f.width };
     columns.push(("width".to_owned(), floats(&mut layers.iter().zip(frame).flat_map(width).copied())));
+    for (c, name) in facts.shadow_columns().iter().enumerate() {
+        let name = name.replace([':', '-'], "_");
+        columns.push((name, floats(&mut frame.iter().flat_map(|f| f.transmittance[c].iter().copied()))));
+    }
     if layers.iter().any(HairLayer::color_per_point) {
         let colors: Vec<[f32; 3]> = layers.iter().flat_map(point_colors).collect();
         for (k, name) in ["r", "g", "b"].into_iter().enumerate() {

@@ -24,6 +24,8 @@ const ROOT: &str = "Hair";
 /// point, `vertex`, where the layer has it so), `displayOpacity`, and with a skin `skinprim`, `skinprimuv`. One a point:
 /// `rest`. Constant: `layer`, `pelage` (the facts of the shot, also in the `customLayerData` of the file). Where a frame
 /// brings widths or opacities of its own, `widths` or `displayOpacity` has a sample at every frame beside the layer's.
+/// Where the facts name lights, `transmittance` (one a point, of all lights together, the same as `groom_ao`) and
+/// `transmittance:NAME` of each light have a sample at every frame.
 pub struct UsdHair {
     path: PathBuf,
     check: ShotCheck,
@@ -42,6 +44,8 @@ struct LayerOut {
     samples: [Vec<Rep>; 3],
     width: Sampled,
     opacity: Sampled,
+    /// Columns of transmittance, and their samples.
+    shadow: Vec<(Vec<Node>, Vec<Rep>)>,
 }
 
 /// A column that the layer has and single frames may replace.
@@ -74,9 +78,8 @@ impl UsdHair {
         let start = || -> io::Result<_> {
             let mut out = CrateWriter::new(File::create(path)?)?;
             let root = write_stage(&mut out, facts)?;
-            let summary = facts_text(facts);
             let names = identifiers(layers.iter().map(|l| l.name.as_str()));
-            let layers = layers.iter().zip(&names).map(|(l, name)| write_layer(&mut out, root, l, name, &summary));
+            let layers = layers.iter().zip(&names).map(|(l, name)| write_layer(&mut out, root, l, name, facts));
             let layers = layers.collect::<io::Result<_>>()?;
             Ok((out, layers))
         };
@@ -95,7 +98,11 @@ impl UsdHair {
                 layer.samples[1].push(self.out.array(data.velocity)?);
                 layer.samples[2].push(self.out.array(&extent)?);
                 layer.width.push(&mut self.out, data.width)?;
-                layer.opacity.push(&mut self.out, data.opacity)
+                layer.opacity.push(&mut self.out, data.opacity)?;
+                for ((_, samples), column) in layer.shadow.iter_mut().zip(data.transmittance) {
+                    samples.push(self.out.array(column)?);
+                }
+                Ok(())
             };
             write().map_err(|e| write_error(&self.path, &e))?;
         }
@@ -118,6 +125,10 @@ impl UsdHair {
                 for column in [layer.width, layer.opacity].into_iter().filter(|c| c.any) {
                     let samples = out.time_samples(times, &column.samples)?;
                     out.field(column.node, "timeSamples", samples);
+                }
+                for (nodes, samples) in layer.shadow {
+                    let samples = out.time_samples(times, &samples)?;
+                    nodes.into_iter().for_each(|node| out.field(node, "timeSamples", samples));
                 }
             }
             out.finish().map(drop)
@@ -177,6 +188,11 @@ fn facts_text(facts: &ShotFacts) -> String {
     facts_list(facts).map(|(k, v)| format!("{k}={v}")).collect::<Vec<_>>().join("\n")
 }
 
+/// A column's name as USD allows it: no dashes.
+fn property(name: &str) -> String {
+    name.replace('-', "_")
+}
+
 /// Names that USD allows for prims: ASCII letters, digits and underscores, no digit first, all different.
 fn identifiers<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
     let mut out: Vec<String> = vec![];
@@ -201,7 +217,7 @@ fn write_layer(
     root: Node,
     layer: &HairLayer,
     name: &str,
-    facts: &str,
+    facts: &ShotFacts,
 ) -> io::Result<LayerOut> {
     let prim = out.prim(root, name, "BasisCurves");
     let display = out.string(&layer.name);
@@ -232,9 +248,17 @@ fn write_layer(
         column.write("primvars:skinprimuv", "texCoord2f[]", "uniform", &layer.skin_bary)?;
     }
     column.text("primvars:layer", &layer.name);
-    column.text("primvars:pelage", facts);
+    column.text("primvars:pelage", &facts_text(facts));
+    let names = facts.shadow_columns();
+    let shadow = names.iter().enumerate().map(|(i, name)| {
+        let node = column.unset(&format!("primvars:{}", property(name)), "float[]", "vertex");
+        // Where a game engine reads light.
+        let other = (i == 0).then(|| column.unset("primvars:groom_ao", "float[]", "vertex"));
+        (std::iter::once(node).chain(other).collect(), vec![])
+    });
+    let shadow = shadow.collect();
     let pad = half_widest(&layer.width);
-    Ok(LayerOut { points, velocities, extent, pad, samples: [vec![], vec![], vec![]], width, opacity })
+    Ok(LayerOut { points, velocities, extent, pad, samples: [vec![], vec![], vec![]], width, opacity, shadow })
 }
 
 /// Writes attributes of one prim that have an interpolation.
@@ -261,10 +285,16 @@ impl Columns<'_> {
     }
 
     fn field(&mut self, name: &str, type_name: &str, interpolation: &str, value: Rep) -> Node {
+        let node = self.unset(name, type_name, interpolation);
+        self.out.field(node, "default", value);
+        node
+    }
+
+    /// An attribute without a value but those of its samples.
+    fn unset(&mut self, name: &str, type_name: &str, interpolation: &str) -> Node {
         let node = self.out.attribute(self.prim, name, type_name);
         let interpolation = self.out.token(interpolation);
         self.out.field(node, "interpolation", interpolation);
-        self.out.field(node, "default", value);
         node
     }
 }
@@ -324,7 +354,10 @@ fn verify_samples(file: &mut CrateFile, prim: FileNode, facts: &ShotFacts, layer
         ("widths", Type::Float, points, moving[0]),
         ("primvars:displayOpacity", Type::Float, curves, moving[1]),
     ];
-    for (name, kind, len, _) in all.into_iter().filter(|column| column.3) {
+    let shadows: Vec<String> =
+        facts.shadow_columns().iter().map(|name| format!("primvars:{}", property(name))).collect();
+    let shadows = shadows.iter().map(|name| (name.as_str(), Type::Float, points, true));
+    for (name, kind, len, _) in all.into_iter().filter(|column| column.3).chain(shadows) {
         let samples = file.attribute(prim, name).and_then(|a| file.field(a, "timeSamples"));
         let samples = samples.ok_or_else(|| file.bad(format!("has no samples of {name}")))?;
         let (found, values) = file.samples(samples)?;

@@ -11,7 +11,16 @@ fn error(elements: &[Element]) -> String {
 
 fn facts(origin: [f64; 3]) -> ShotFacts {
     let extra = vec![("version".to_owned(), "1\n2".to_owned())];
-    ShotFacts { name: "s".into(), meters_per_unit: 0.01, up: 'Y', fps: 24.0, frames: vec![1001], origin, extra }
+    ShotFacts {
+        name: "s".into(),
+        meters_per_unit: 0.01,
+        up: 'Y',
+        fps: 24.0,
+        frames: vec![1001],
+        origin,
+        lights: vec![],
+        extra,
+    }
 }
 
 fn layer(name: &str, counts: &[usize], first_id: u64) -> HairLayer {
@@ -92,6 +101,19 @@ fn colours_of_points_and_columns_of_frames_are_written() {
     assert_eq!(hair.f32("opacity").unwrap(), [0.25, 0.5, 0.75, 1.0]);
     assert!(hair.column("r").is_none());
     assert_eq!(read_curves(&path).unwrap().width.unwrap(), vertex.f32("width").unwrap());
+    let lit = ShotFacts { lights: vec!["key".into(), "rim-2".into()], ..facts.clone() };
+    assert!(write_hair(&path, &lit, &layers, &frame).unwrap_err().to_string().contains("expected 3"));
+    let light: Vec<Vec<Vec<f32>>> =
+        [5, 4, 2].iter().map(|n| (0..3).map(|c| vec![0.25 * (c + 1) as f32; *n]).collect()).collect();
+    let shadowed: Vec<HairFrame> =
+        frame.iter().zip(&light).map(|(f, transmittance)| HairFrame { transmittance, ..*f }).collect();
+    write_hair(&path, &lit, &layers, &shadowed).unwrap();
+    verify_hair(&path, &lit, &layers, &shadowed).unwrap();
+    let tables = read_tables(&path).unwrap();
+    for (name, value) in [("transmittance", 0.25), ("transmittance_key", 0.5), ("transmittance_rim_2", 0.75)] {
+        assert_eq!(tables.get("vertex").unwrap().f32(name).unwrap(), [value; 11]);
+    }
+    write_hair(&path, &facts, &layers, &frame).unwrap();
     // What differs is named.
     let e = verify_hair(&path, &facts, &layers, &[of(0..5), frame[1], frame[2]]).unwrap_err().to_string();
     assert!(e.contains("(element hair): opacity differs"), "{e}");

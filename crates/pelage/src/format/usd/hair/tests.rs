@@ -122,6 +122,44 @@ fn widths_and_opacities_of_frames_are_samples() {
 }
 
 #[test]
+fn transmittance_has_a_column_for_every_light_and_one_for_all() {
+    let dir = tempfile::tempdir().unwrap();
+    let (facts, layers) = samples::lit();
+    let path = dir.path().join("a.usdc");
+    let mut out = UsdHair::create(&path, &facts, &layers).unwrap();
+    for &frame in &facts.frames {
+        let data: Vec<_> = layers.iter().map(|l| (samples::frame(l, frame), samples::light(l, frame))).collect();
+        let data: Vec<_> = data
+            .iter()
+            .map(|((position, velocity), transmittance)| HairFrame {
+                position,
+                velocity,
+                transmittance,
+                ..HairFrame::default()
+            })
+            .collect();
+        out.write_frame(frame, &data).unwrap();
+    }
+    out.finish().unwrap();
+    verify(&path, &facts, &layers).unwrap();
+    let dark = ShotFacts { lights: vec!["key".into(), "other".into()], ..facts.clone() };
+    assert!(verify(&path, &dark, &layers).unwrap_err().to_string().contains("transmittance:other"));
+    let mut file = CrateFile::open(&path).unwrap();
+    let hair = file.prims_below(file.root()).unwrap()[0];
+    let prim = file.prims_below(hair).unwrap()[1];
+    for (name, column) in [("transmittance", 0), ("groom_ao", 0), ("transmittance:key", 1), ("transmittance:rim_2", 2)]
+    {
+        let node = file.attribute(prim, &format!("primvars:{name}")).unwrap();
+        let samples = file.field(node, "timeSamples").unwrap();
+        let (times, values) = file.samples(samples).unwrap();
+        assert_eq!(times, [1001.0, 1002.0, 1003.0]);
+        for (value, frame) in values.into_iter().zip(&facts.frames) {
+            assert_eq!(file.floats(value, 1).unwrap(), samples::light(&layers[1], *frame)[column]);
+        }
+    }
+}
+
+#[test]
 fn names_become_valid_and_different() {
     let names = ["a b", "a_b", "é", "", "9", "a:b"];
     assert_eq!(identifiers(names.into_iter()), ["a_b", "a_b_2", "_", "__2", "_9", "a_b_3"]);
