@@ -121,46 +121,22 @@ impl Reader<'_> {
     }
 
     /// Lights as files have them: which columns there are, and what weighs them.
-    pub(super) fn lights_of_files(&self, mut r: Recipe) -> Recipe {
-        let light = &self.project.shot.value.light;
-        for l in written_lights(self.project) {
-            r = r.param(&format!("light[{l}].name"), &light[l].name, self.in_shot(&format!("light[{l}].name")));
-            r = self.brightness(l, r);
-        }
-        r
+    pub(super) fn lights_of_files(&self, r: Recipe) -> Recipe {
+        written_lights(self.project).into_iter().fold(r, |r, l| self.brightness(l, true, r))
+    }
+
+    /// Lights as pictures have them, apart from where they are: their shadows say that.
+    pub(super) fn lights_of_pictures(&self, r: Recipe) -> Recipe {
+        (0..self.project.shot.value.light.len()).fold(r, |r, l| self.brightness(l, false, r))
     }
 
     /// How bright a light is, and when.
-    fn brightness(&self, l: usize, r: Recipe) -> Recipe {
+    fn brightness(&self, l: usize, named: bool, r: Recipe) -> Recipe {
         let light = &self.project.shot.value.light[l];
-        [
-            ("intensity", light.intensity.to_string()),
-            ("color", format!("{:?}", light.color)),
-            ("frames", format!("{:?}", light.frames)),
-        ]
-        .into_iter()
-        .fold(r, |r, (key, value)| {
-            let key = format!("light[{l}].{key}");
-            r.param(&key, value, self.in_shot(&key))
-        })
-    }
-
-    /// Lights as pictures have them.
-    pub(super) fn lights_of_pictures(&self, mut r: Recipe) -> Recipe {
-        for (l, light) in self.project.shot.value.light.iter().enumerate() {
-            r = self.brightness(l, r);
-            let values = [
-                ("kind", Some(format!("{:?}", light.kind))),
-                ("direction", light.direction.as_ref().map(ToString::to_string)),
-                ("position", light.position.as_ref().map(ToString::to_string)),
-                ("cone", light.cone.as_ref().map(ToString::to_string)),
-                ("softness", light.softness.as_ref().map(ToString::to_string)),
-            ];
-            for (key, value) in values {
-                let key = format!("light[{l}].{key}");
-                r = value.into_iter().fold(r, |r, v| r.param(&key, v, self.in_shot(&key)));
-            }
-        }
-        r
+        let name = if named { format!("{}, ", light.name) } else { String::new() };
+        let on = light.frames.map_or(String::new(), |[a, b]| format!(", frames {a} to {b}"));
+        let key = format!("light[{l}]");
+        let value = format!("{name}intensity {}, color {:?}{on}", light.intensity, light.color);
+        r.param(&key, value, self.in_shot(&key))
     }
 }
