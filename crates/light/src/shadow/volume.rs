@@ -40,7 +40,7 @@ impl Window {
         let place = |v: f32, weight: &mut [f32; TAPS]| {
             let (low, high) = (v - 0.5 * filter, v + 0.5 * filter);
             let first = low as i32;
-            let taps = ((high - first as f32).ceil() as usize).clamp(1, TAPS - 3);
+            let taps = ((high as i32 - first + 1) as usize).min(TAPS - 3);
             for (k, weight) in weight[..taps.next_multiple_of(4)].iter_mut().enumerate() {
                 let at = (first + k as i32) as f32;
                 *weight = ((at + 1.0).min(high) - at.max(low)).max(0.0) * inverse;
