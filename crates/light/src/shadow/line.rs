@@ -10,7 +10,8 @@ const LINE: f32 = 0.3;
 /// Most lines of one segment.
 const LINES: f32 = 128.0;
 
-/// Deposits of a line per texel. With 1 the error of the default grows by a tenth; more than 4 change nothing.
+/// Deposits of a line per texel. With 1.5 they bunch and the default becomes too bright by 0.004; with 3 its error falls by
+/// 2 % and its time grows by 8 %.
 const DEPOSITS: f32 = 2.0;
 
 /// Deposits of a line per slice.

@@ -134,13 +134,10 @@ pub fn transmittance(
     for projection in &mut projections {
         // Every face knows all that is masked.
         counts.masked = 0;
-        face(projection, layers, &settings, &cells, &mut counts);
+        face(projection, layers, solids, &settings, &cells, &mut counts);
     }
-    let mut out: Vec<Vec<f32>> =
+    let out: Vec<Vec<f32>> =
         cells.into_iter().map(|c| c.into_par_iter().map(|v| f32::from_bits(v.into_inner())).collect()).collect();
-    if let Some(projection) = projections.first() {
-        counts.behind_solid = solid::shade(projection, layers, solids, &mut out);
-    }
     Ok((out, counts))
 }
 
@@ -148,6 +145,7 @@ pub fn transmittance(
 fn face(
     projection: &mut Projection,
     layers: &[ShadowHair],
+    solids: &[Solid],
     settings: &ShadowSettings,
     cells: &[Vec<AtomicU32>],
     counts: &mut ShadowCounts,
@@ -163,13 +161,17 @@ fn face(
             cells[c.layer][i as usize].store(0, Ordering::Relaxed);
         }
     }
-    let worked: usize = (0..grid * grid)
+    let (worked, hidden) = (0..grid * grid)
         .into_par_iter()
         .map_init(
-            || tile::Work::new(projection, settings),
-            |work, t| usize::from(work.run(&chunks, layers, [t % grid, t / grid], t, cells)),
+            || tile::Work::new(projection, settings, solids),
+            |work, t| match work.run(&chunks, layers, [t % grid, t / grid], t, cells) {
+                Some(hidden) => (1, hidden),
+                None => (0, 0),
+            },
         )
-        .sum();
+        .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    counts.behind_solid += hidden;
     counts.texels = projection.texels;
     counts.tiles[0] += worked;
     counts.tiles[1] += grid * grid;
