@@ -3,8 +3,12 @@
 //! The method is Kim's (opacity shadow maps, SIGGRAPH 2003 course notes, §4) cut into tiles: the plane across the light
 //! is divided into squares of [`TILE`] texels, the hair segments are sorted into them, and each tile sums optical depth
 //! into slices of its own, samples its own points and is forgotten. Tiles are independent, so the bytes are the same
-//! for any number of threads, and memory is 24 bytes a point, about 6 a segment and one tile a thread, whatever
-//! the resolution times the slices.
+//! for any number of threads, and memory is 32 bytes a point, about 7 a segment and one tile a thread, whatever the
+//! resolution times the slices.
+//!
+//! A point's own hair is taken out of its footprint by the same deposits that put it in, so no bias in depth is needed.
+//! Solids are met by a ray from the point itself, so their shadows are sharp and exact; only hair is averaged over the
+//! footprint, and the reference does the same.
 //!
 //! Transmittance is the fraction of light that passes all *other* hairs and all solids: a hair of opacity o that lies
 //! across a ray multiplies by 1 - o. Falloff with distance and the shape of a spot's beam are not in it.

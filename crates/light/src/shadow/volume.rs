@@ -161,7 +161,9 @@ impl Volume {
         }
     }
 
-    /// Mean transmittance over a window at slice coordinate `s` in [0, slices], without what the hair itself takes.
+    /// Mean transmittance over a window at slice coordinate `s` in [0, slices], without what the hair itself takes. The mean
+    /// is over transmittance, as a footprint's is: of mean optical depth it would be too dark, at the default by 0.017 in
+    /// long hair and 0.027 in fur.
     #[inline]
     pub fn sample(&self, window: &Window, s: f32, own: &Own, interpolation: Interpolation) -> f32 {
         let (plane, f) = self.plane(s);
