@@ -1,4 +1,4 @@
-//! Opacity shadow maps: error against cost, and speed.
+//! Opacity shadow maps: error against cost, what solids cost, and speed.
 //!
 //! `cargo bench -p pelage-light --bench shadow`
 // A benchmark has to read the clock, which the crate itself must not.
@@ -7,48 +7,96 @@
 #[path = "../tests/common/mod.rs"]
 mod common;
 
-use common::{Groom, curly, fur, long, score, some_points};
+use common::{BALL, Body, Groom, ball, curly, fur, long, score, some_points};
 use pelage_geom::Vec3;
-use pelage_light::shadow::{Footprint, Quality, ShadowSettings, Source, transmittance, transmittance_exact};
+use pelage_light::shadow::{
+    Footprint, Interpolation, Placement, Quality, Sample, ShadowHair, ShadowSettings, Solid, Source, transmittance,
+    transmittance_exact,
+};
 use std::hint::black_box;
 use std::time::Instant;
 
+const SOURCE: Source = Source::Directional { direction: Vec3::new(-0.4, -1.0, -0.3) };
+const RUNS: usize = 5;
+
 fn main() {
-    let source = Source::Directional { direction: Vec3::new(-0.4, -1.0, -0.3) };
-    let grooms: Vec<(&str, Groom)> =
-        vec![("long", long(50_000, 26)), ("fur", fur(100_000, 9)), ("curly", curly(10_000, 101))];
-    let footprint = Footprint { side: 1.0 / 256.0, rays: 1024, seed: 1 };
+    println!("groom,texels,slices,placement,interpolation,filter,rms,p95,bias,seconds,megabytes");
+    let grooms: [(&str, Groom); 3] =
+        [("long", long(40_000, 26)), ("fur", fur(100_000, 9)), ("curly", curly(10_000, 101))];
     for (name, groom) in &grooms {
-        let layers = [groom.view()];
-        let points = some_points(&layers, 2000);
-        let start = Instant::now();
-        let truth = transmittance_exact(source, &layers, &[], &footprint, &points).expect("light");
-        let each = start.elapsed().as_secs_f64() / points.len() as f64;
-        let mean = truth.iter().map(|t| t.mean).sum::<f64>() / truth.len() as f64;
-        println!("# {name}: exact {:.1} us per point of 1058 rays, mean {mean:.4}", 1e6 * each);
-        for texels in [128, 256, 512, 1024, 2048] {
-            for slices in [32, 64, 128, 256] {
-                let settings = ShadowSettings { texels, slices, ..Quality::Default.settings() };
-                let start = Instant::now();
-                let (light, counts) = transmittance(source, &layers, &[], &settings).expect("light");
-                let s = start.elapsed().as_secs_f64();
-                let [rms, p95, bias] = score(&light, &points, &truth);
-                println!(
-                    "{name},{texels},{slices},{rms:.4},{p95:.4},{bias:+.4},{s:.3},{:.1}",
-                    counts.bytes as f64 / 1e6
-                );
+        errors(name, groom);
+    }
+    speed();
+}
+
+/// Prints the table of one groom.
+fn errors(name: &str, groom: &Groom) {
+    let layers = [groom.view()];
+    let points = some_points(&layers, 1500);
+    let footprint = Footprint { side: 1.0 / 256.0, rays: 1024, seed: 1 };
+    let start = Instant::now();
+    let truth = transmittance_exact(SOURCE, &layers, &[], &footprint, &points).expect("light");
+    let each = start.elapsed().as_secs_f64() / points.len() as f64 / 1058.0;
+    println!("# {name}: {} points, exact {:.2} us a ray", groom.position.len(), 1e6 * each);
+    let row = |settings| row(name, &layers, &points, &truth, settings);
+    for texels in [256, 512, 1024, 2048] {
+        for slices in [16, 32, 64, 128] {
+            for placement in [Placement::Uniform, Placement::Histogram] {
+                row(ShadowSettings { texels, slices, placement, ..Default::default() });
             }
         }
     }
-    let groom = long(100_000, 26);
-    let layers = [groom.view()];
-    let mut seconds: Vec<f64> = (0..5)
+    for interpolation in [Interpolation::Transmittance, Interpolation::Cubic] {
+        row(ShadowSettings { slices: 32, interpolation, ..Default::default() });
+        row(ShadowSettings { interpolation, ..Default::default() });
+    }
+    for filter in [1.0 / 512.0, 1.0 / 320.0, 1.0 / 192.0, 1.0 / 128.0] {
+        row(ShadowSettings { filter, ..Default::default() });
+    }
+    for quality in [Quality::Draft, Quality::Fine, Quality::Reference] {
+        row(quality.settings());
+    }
+}
+
+fn row(name: &str, layers: &[ShadowHair], points: &[[usize; 2]], truth: &[Sample], settings: ShadowSettings) {
+    let start = Instant::now();
+    let (light, counts) = transmittance(SOURCE, layers, &[], &settings).expect("light");
+    let seconds = start.elapsed().as_secs_f64();
+    let [rms, p95, bias] = score(&light, points, truth);
+    let ShadowSettings { texels, slices, placement, interpolation, filter } = settings;
+    println!(
+        "{name},{texels},{slices},{placement:?},{interpolation:?},1/{:.0},{rms:.4},{p95:.4},{bias:+.4},{seconds:.3},{:.1}",
+        1.0 / filter,
+        counts.bytes as f64 / 1e6
+    );
+}
+
+/// Median of some runs on some threads.
+fn median(threads: usize, layers: &[ShadowHair], solids: &[Solid], settings: &ShadowSettings) -> f64 {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+    let mut seconds: Vec<f64> = (0..RUNS)
         .map(|_| {
             let start = Instant::now();
-            black_box(transmittance(source, &layers, &[], &Quality::Default.settings()).expect("light"));
+            black_box(pool.install(|| transmittance(SOURCE, layers, solids, settings))).expect("light");
             start.elapsed().as_secs_f64()
         })
         .collect();
     seconds.sort_by(f64::total_cmp);
-    println!("# speed: 2,500,000 segments, median {:.3} s, best {:.3} s", seconds[2], seconds[0]);
+    seconds[RUNS / 2]
+}
+
+/// Prints times for 100,000 hairs of 25 segments.
+fn speed() {
+    let groom = long(100_000, 26);
+    let layers = [groom.view()];
+    let body = Body::new(ball(100, BALL));
+    let solids = [body.view()];
+    for quality in [Quality::Draft, Quality::Default] {
+        for threads in [1, 2] {
+            let seconds = median(threads, &layers, &[], &quality.settings());
+            println!("# {quality:?}: 2,500,000 segments, {threads} threads: median {seconds:.3} s");
+        }
+    }
+    let seconds = median(2, &layers, &solids, &Quality::Default.settings());
+    println!("# Default with a skin of {} triangles, 2 threads: median {seconds:.3} s", body.triangle.len());
 }

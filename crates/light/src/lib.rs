@@ -1,4 +1,4 @@
-//! Hair under light: shading and the preview rasteriser.
+//! Hair under light: shadow of hair on hair, shading and the preview rasteriser.
 //!
 //! Colours are linear with the primaries of sRGB, unless a name says otherwise. The camera looks along +z of its own
 //! frame, x to the right and y down; pixel (i, j) covers [i, i + 1] x [j, j + 1], the first row on top.

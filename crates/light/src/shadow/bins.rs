@@ -86,8 +86,9 @@ impl Chunk {
         &self.list[self.start[t] as usize..self.start[t + 1] as usize]
     }
 
+    /// Memory, with the tiles of each point that are known while lists are made.
     pub fn bytes(&self) -> usize {
-        24 * self.point.len() + 4 * (self.start.len() + self.list.len() + self.masked.len())
+        32 * self.point.len() + 4 * (self.start.len() + self.list.len() + self.masked.len())
     }
 
     /// Strand in the layer of point `k` of the chunk.

@@ -194,8 +194,7 @@ impl Cells {
     ) -> Sample {
         let layer = &layers[l];
         let p = layer.point(i);
-        let Some((toward, distance)) = projection.toward(p) else { return Sample { mean: 1.0, variance: 0.0 } };
-        if !solids.iter().all(|s| solid::is_lit(s, p, toward, distance, projection.size)) {
+        if solid::is_hidden(solids, p, projection) {
             return Sample::default();
         }
         let strand = super::bins::strand_of(layers, l, i);

@@ -10,7 +10,8 @@ const LINE: f32 = 0.3;
 /// Most lines of one segment.
 const LINES: f32 = 128.0;
 
-/// Deposits of a line per texel. With 1 the error of the default grows by a tenth; more than 4 change nothing.
+/// Deposits of a line per texel. With 1.5 they bunch and the default becomes too bright by 0.004; with 3 its error falls by
+/// 2 % and its time grows by 8 %.
 const DEPOSITS: f32 = 2.0;
 
 /// Deposits of a line per slice.
@@ -21,8 +22,9 @@ const OPAQUE: f32 = 0.99999;
 
 /// Optical depth per area covered: -ln(1 - o c) / c for the mean coverage c that a hair of `width` texels has of the
 /// texels it touches, weighted by itself. Hairs of one texel are independent of each other, so its mean transmittance
-/// is the product of 1 - o c; o alone (the limit for thin hairs) leaves hairs of a texel's width too clear, and
-/// -ln(1 - o), right for a hair that covers the texel, makes thin ones too dark.
+/// is the product of 1 - o c. Measured at the default (long hair, fur): bias 0.001 and 0.000. With o alone, the limit for
+/// thin hairs, hairs that are not much thinner than a texel are too clear: bias +0.022, +0.031. With -ln(1 - o), right
+/// for a hair that covers the texel, thin ones are too dark: -0.121, -0.123.
 pub(crate) fn thickness(width: f32, opacity: f32) -> f32 {
     let width = width.max(1e-6);
     // A strip along the texels, anywhere between them.

@@ -3,8 +3,12 @@
 //! The method is Kim's (opacity shadow maps, SIGGRAPH 2003 course notes, §4) cut into tiles: the plane across the light
 //! is divided into squares of [`TILE`] texels, the hair segments are sorted into them, and each tile sums optical depth
 //! into slices of its own, samples its own points and is forgotten. Tiles are independent, so the bytes are the same
-//! for any number of threads, and memory is 24 bytes a point, about 6 a segment and one tile a thread, whatever
-//! the resolution times the slices.
+//! for any number of threads, and memory is 32 bytes a point, about 7 a segment and one tile a thread, whatever the
+//! resolution times the slices.
+//!
+//! A point's own hair is taken out of its footprint by the same deposits that put it in, so no bias in depth is needed.
+//! Solids are met by a ray from the point itself, so their shadows are sharp and exact; only hair is averaged over the
+//! footprint, and the reference does the same.
 //!
 //! Transmittance is the fraction of light that passes all *other* hairs and all solids: a hair of opacity o that lies
 //! across a ray multiplies by 1 - o. Falloff with distance and the shape of a spot's beam are not in it.
@@ -134,13 +138,10 @@ pub fn transmittance(
     for projection in &mut projections {
         // Every face knows all that is masked.
         counts.masked = 0;
-        face(projection, layers, &settings, &cells, &mut counts);
+        face(projection, layers, solids, &settings, &cells, &mut counts);
     }
-    let mut out: Vec<Vec<f32>> =
+    let out: Vec<Vec<f32>> =
         cells.into_iter().map(|c| c.into_par_iter().map(|v| f32::from_bits(v.into_inner())).collect()).collect();
-    if let Some(projection) = projections.first() {
-        counts.behind_solid = solid::shade(projection, layers, solids, &mut out);
-    }
     Ok((out, counts))
 }
 
@@ -148,6 +149,7 @@ pub fn transmittance(
 fn face(
     projection: &mut Projection,
     layers: &[ShadowHair],
+    solids: &[Solid],
     settings: &ShadowSettings,
     cells: &[Vec<AtomicU32>],
     counts: &mut ShadowCounts,
@@ -163,13 +165,17 @@ fn face(
             cells[c.layer][i as usize].store(0, Ordering::Relaxed);
         }
     }
-    let worked: usize = (0..grid * grid)
+    let (worked, hidden) = (0..grid * grid)
         .into_par_iter()
         .map_init(
-            || tile::Work::new(projection, settings),
-            |work, t| usize::from(work.run(&chunks, layers, [t % grid, t / grid], t, cells)),
+            || tile::Work::new(projection, settings, solids),
+            |work, t| match work.run(&chunks, layers, [t % grid, t / grid], t, cells) {
+                Some(hidden) => (1, hidden),
+                None => (0, 0),
+            },
         )
-        .sum();
+        .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    counts.behind_solid += hidden;
     counts.texels = projection.texels;
     counts.tiles[0] += worked;
     counts.tiles[1] += grid * grid;

@@ -54,7 +54,7 @@ impl Quality {
     pub fn settings(self) -> ShadowSettings {
         let (texels, slices) = match self {
             Quality::Draft => (512, 32),
-            Quality::Default => (1024, 64),
+            Quality::Default => (1024, 96),
             Quality::Fine => (2048, 128),
             Quality::Reference => (4096, 256),
         };
@@ -65,11 +65,15 @@ impl Quality {
 /// Default side of the footprint, as a fraction of the map's side.
 const FOOTPRINT: f64 = 1.0 / 256.0;
 
+/// The default is where the measured curve bends: half the texels raise the RMS error from 0.020 to 0.030 (fur) for half
+/// the time, twice the texels lower it to 0.014 for twice the time. With 32 slices it is 0.022, with 256 hardly less.
+/// Slices at equal distances need four times as many for the same error, and the three interpolations differ by less
+/// than the sampling noise. A filter wider or narrower than the footprint by a quarter raises the error by a third.
 impl Default for ShadowSettings {
     fn default() -> Self {
         ShadowSettings {
             texels: 1024,
-            slices: 64,
+            slices: 96,
             placement: Placement::Histogram,
             filter: FOOTPRINT,
             interpolation: Interpolation::OpticalDepth,
@@ -92,20 +96,35 @@ impl ShadowSettings {
     }
 }
 
-/// Settings with their measured error.
+/// Settings with their measured error: the worst of three grooms (see [`MEASURED`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
-    /// The settings, by texels and slices; the rest as in the default.
-    pub size: [usize; 2],
-    /// RMS error of transmittance against the footprint truth, sampling noise removed.
+    /// As [`ShadowSettings::texels`].
+    pub texels: usize,
+    /// As [`ShadowSettings::slices`].
+    pub slices: usize,
+    /// Root mean square of the error of transmittance, sampling noise of the truth taken out in quadrature.
     pub rms: f64,
+    /// 95th percentile of the size of the error, noise of the truth (0.006) included.
+    pub p95: f64,
 }
 
-/// Errors of the default footprint, cheapest first.
-pub const MEASURED: [Measured; 2] = [Measured { size: [512, 32], rms: 0.04 }, Measured { size: [1024, 64], rms: 0.02 }];
+/// Errors at the default placement, interpolation and footprint, cheapest first, under slanted parallel light, against
+/// 1058 exact rays from the footprint of each of 1500 points: long hair (40,000 hairs, 20 cm, on a ball of 10 cm), fur
+/// (100,000, 2 cm), curls (10,000), 80 um wide, opacity 0.5 to 1 (benches/shadow.rs). The size of the bias is 0.002 at
+/// most.
+pub const MEASURED: [Measured; 7] = [
+    Measured { texels: 256, slices: 16, rms: 0.055, p95: 0.116 },
+    Measured { texels: 512, slices: 32, rms: 0.033, p95: 0.070 },
+    Measured { texels: 1024, slices: 32, rms: 0.022, p95: 0.046 },
+    Measured { texels: 1024, slices: 96, rms: 0.020, p95: 0.042 },
+    Measured { texels: 2048, slices: 64, rms: 0.0145, p95: 0.032 },
+    Measured { texels: 2048, slices: 128, rms: 0.0140, p95: 0.031 },
+    Measured { texels: 4096, slices: 256, rms: 0.0085, p95: 0.021 },
+];
 
 /// The cheapest measured settings whose RMS error is at most `rms`; the finest if none is.
 pub fn for_error(rms: f64) -> ShadowSettings {
     let found = MEASURED.iter().find(|m| m.rms <= rms).unwrap_or(&MEASURED[MEASURED.len() - 1]);
-    ShadowSettings { texels: found.size[0], slices: found.size[1], ..ShadowSettings::default() }
+    ShadowSettings { texels: found.texels, slices: found.slices, ..ShadowSettings::default() }
 }

@@ -1,9 +1,7 @@
 //! What solid things hide from a light.
 
-use super::ShadowHair;
-use super::project::{Projection, is_usable};
+use super::project::Projection;
 use pelage_geom::{Bvh, Vec3};
-use rayon::prelude::*;
 
 /// A solid mesh in the pose of the frame: skin, clothes, a prop. Its triangles are counter-clockwise seen from outside.
 #[derive(Clone, Copy, Debug)]
@@ -26,7 +24,7 @@ const PASSED: usize = 8;
 
 /// True if light reaches `p` past one solid. A point on the surface is lit if that surface faces the light: whether a
 /// root is a rounding error inside or outside says nothing. Points inside are dark.
-pub(crate) fn is_lit(solid: &Solid, p: Vec3, toward: Vec3, distance: f64, size: f64) -> bool {
+fn is_lit(solid: &Solid, p: Vec3, toward: Vec3, distance: f64, size: f64) -> bool {
     let on = ON * size;
     // From just before the point, so that its own surface is met on either side of it.
     let start = p - toward * on;
@@ -47,36 +45,8 @@ pub(crate) fn is_lit(solid: &Solid, p: Vec3, toward: Vec3, distance: f64, size: 
     true
 }
 
-/// Puts points behind solids in the dark; how many.
-pub(crate) fn shade(projection: &Projection, layers: &[ShadowHair], solids: &[Solid], out: &mut [Vec<f32>]) -> usize {
-    if solids.is_empty() {
-        return 0;
-    }
-    let hidden = |layer: &ShadowHair, i: usize| {
-        let p = layer.point(i);
-        if !is_usable(p) {
-            return false;
-        }
-        let Some((toward, distance)) = projection.toward(p) else { return false };
-        !solids.iter().all(|s| is_lit(s, p, toward, distance, projection.size))
-    };
-    layers
-        .iter()
-        .zip(out)
-        .map(|(layer, out)| {
-            out.par_chunks_mut(4096)
-                .enumerate()
-                .map(|(c, out)| {
-                    let mut count = 0;
-                    for (k, v) in out.iter_mut().enumerate() {
-                        if *v > 0.0 && hidden(layer, c * 4096 + k) {
-                            *v = 0.0;
-                            count += 1;
-                        }
-                    }
-                    count
-                })
-                .sum::<usize>()
-        })
-        .sum()
+/// True if a solid lies between `p` and the light.
+pub(crate) fn is_hidden(solids: &[Solid], p: Vec3, projection: &Projection) -> bool {
+    let Some((toward, distance)) = projection.toward(p) else { return false };
+    !solids.iter().all(|s| is_lit(s, p, toward, distance, projection.size))
 }

@@ -4,6 +4,7 @@ use super::bins::{Chunk, Point, Segment};
 use super::line::Line;
 use super::project::Projection;
 use super::settings::{Placement, ShadowSettings};
+use super::solid::{self, Solid};
 use super::volume::{Own, Volume, Window};
 use super::{ShadowHair, TILE};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -23,6 +24,9 @@ const AHEAD: usize = 64;
 pub(crate) struct Work<'a> {
     projection: &'a Projection,
     settings: &'a ShadowSettings,
+    solids: &'a [Solid<'a>],
+    /// Points of the tile behind solids.
+    hidden: usize,
     volume: Volume,
     segment: Vec<Cast>,
     receiver: Vec<Receiver>,
@@ -47,10 +51,12 @@ struct Receiver {
 }
 
 impl<'a> Work<'a> {
-    pub fn new(projection: &'a Projection, settings: &'a ShadowSettings) -> Work<'a> {
+    pub fn new(projection: &'a Projection, settings: &'a ShadowSettings, solids: &'a [Solid<'a>]) -> Work<'a> {
         Work {
             projection,
             settings,
+            solids,
+            hidden: 0,
             volume: Volume::new(projection.filter, settings.slices),
             segment: Vec::new(),
             receiver: Vec::new(),
@@ -61,7 +67,7 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// Works tile `t` at `place`; false if it has nothing to give.
+    /// Works tile `t` at `place`; how many of its points are behind solids; `None` if it has nothing to give.
     pub fn run(
         &mut self,
         chunks: &[Chunk],
@@ -69,8 +75,9 @@ impl<'a> Work<'a> {
         place: [usize; 2],
         t: usize,
         cells: &[Vec<AtomicU32>],
-    ) -> bool {
-        let Some([from, to]) = self.gather(chunks, layers, place, t) else { return false };
+    ) -> Option<usize> {
+        let [from, to] = self.gather(chunks, layers, place, t)?;
+        self.hidden = 0;
         self.place_slices(from, to);
         self.volume.clear();
         self.line.clear();
@@ -91,9 +98,9 @@ impl<'a> Work<'a> {
         self.fill(&mut s, |_| true);
         self.volume.sum();
         for (receivers, lines) in runs {
-            self.receive(receivers, lines, cells);
+            self.receive(receivers, lines, layers, cells);
         }
-        true
+        Some(self.hidden)
     }
 
     /// Puts segments from `next` on into the volume while their strand is of a kind.
@@ -196,7 +203,13 @@ impl<'a> Work<'a> {
     }
 
     /// Gives points of one strand their values.
-    fn receive(&mut self, receivers: std::ops::Range<usize>, lines: std::ops::Range<usize>, cells: &[Vec<AtomicU32>]) {
+    fn receive(
+        &mut self,
+        receivers: std::ops::Range<usize>,
+        lines: std::ops::Range<usize>,
+        layers: &[ShadowHair],
+        cells: &[Vec<AtomicU32>],
+    ) {
         let interpolation = self.settings.interpolation;
         for r in &self.receiver[receivers] {
             let window = &mut self.window;
@@ -206,7 +219,14 @@ impl<'a> Work<'a> {
             for line in &self.line[lines.clone()] {
                 self.own.add(window, line, plane as i32, f, interpolation);
             }
-            let light = self.volume.sample(window, r.at[2], &self.own, interpolation);
+            let mut light = self.volume.sample(window, r.at[2], &self.own, interpolation);
+            if !self.solids.is_empty() && light > 0.0 {
+                let p = layers[r.layer as usize].point(r.point as usize);
+                if solid::is_hidden(self.solids, p, self.projection) {
+                    light = 0.0;
+                    self.hidden += 1;
+                }
+            }
             cells[r.layer as usize][r.point as usize].store(light.to_bits(), Ordering::Relaxed);
         }
     }

@@ -40,7 +40,7 @@ impl Window {
         let place = |v: f32, weight: &mut [f32; TAPS]| {
             let (low, high) = (v - 0.5 * filter, v + 0.5 * filter);
             let first = low as i32;
-            let taps = ((high - first as f32).ceil() as usize).clamp(1, TAPS - 3);
+            let taps = ((high as i32 - first + 1) as usize).min(TAPS - 3);
             for (k, weight) in weight[..taps.next_multiple_of(4)].iter_mut().enumerate() {
                 let at = (first + k as i32) as f32;
                 *weight = ((at + 1.0).min(high) - at.max(low)).max(0.0) * inverse;
@@ -161,42 +161,30 @@ impl Volume {
         }
     }
 
-    /// Mean transmittance over a window at slice coordinate `s` in [0, slices], without what the hair itself takes.
+    /// Mean transmittance over a window at slice coordinate `s` in [0, slices], without what the hair itself takes. The mean
+    /// is over transmittance, as a footprint's is: of mean optical depth it would be too dark, at the default by 0.017 in
+    /// long hair and 0.027 in fur.
     #[inline]
     pub fn sample(&self, window: &Window, s: f32, own: &Own, interpolation: Interpolation) -> f32 {
         let (plane, f) = self.plane(s);
         let layer = self.stride * self.side;
-        let at = |p: usize, row: usize, x: usize| {
-            let start = p * layer + (window.y as usize + row) * self.stride + window.x as usize + x;
-            f32x4::from(<[f32; 4]>::try_from(&self.depth[start..start + 4]).unwrap_or_default())
-        };
-        let own = |k: usize, row: usize, x: usize| {
-            f32x4::from(<[f32; 4]>::try_from(&own.0[k][row * TAPS + x..row * TAPS + x + 4]).unwrap_or_default())
-        };
+        let corner = window.y as usize * self.stride + window.x as usize;
         let f4 = f32x4::splat(f);
+        let row_of =
+            |v: &[f32], start: usize| f32x4::from(<[f32; 4]>::try_from(&v[start..start + 4]).unwrap_or_default());
         let mut sum = f32x4::ZERO;
         for row in 0..window.down {
             let mut line = f32x4::ZERO;
             for x in (0..window.across).step_by(4) {
-                let (a, b) = (at(plane, row, x), at(plane + 1, row, x));
-                let light = match interpolation {
-                    Interpolation::OpticalDepth => exp_neg(a + (b - a) * f4 - own(0, row, x)),
-                    Interpolation::Transmittance => {
-                        let (a, b) = (exp_neg(a - own(0, row, x)), exp_neg(b - own(1, row, x)));
-                        a + (b - a) * f4
-                    }
-                    Interpolation::Cubic => {
-                        let (a, b) = (a - own(1, row, x), b - own(2, row, x));
-                        let before = plane.max(1) - 1;
-                        let after = (plane + 2).min(self.slices);
-                        let z = at(before, row, x) - if plane > 0 { own(0, row, x) } else { own(1, row, x) };
-                        let c =
-                            at(after, row, x) - if plane + 2 <= self.slices { own(3, row, x) } else { own(2, row, x) };
-                        exp_neg(cubic(z, a, b, c, f4))
-                    }
-                };
-                let w = &window.weight[0][x..x + 4];
-                line += light * f32x4::new([w[0], w[1], w[2], w[3]]);
+                let light = shade(
+                    interpolation,
+                    plane,
+                    self.slices,
+                    f4,
+                    |p| row_of(&self.depth, p * layer + corner + row * self.stride + x),
+                    |k| row_of(&own.0[k], row * TAPS + x),
+                );
+                line += light * row_of(&window.weight[0], x);
             }
             sum += line * f32x4::splat(window.weight[1][row]);
         }
@@ -210,6 +198,32 @@ impl Volume {
         let s = s.clamp(0.0, self.slices as f32);
         let p = (s as usize).min(self.slices - 1);
         (p, s - p as f32)
+    }
+}
+
+/// Transmittance of four texels at `f` after `plane`, from the depths at planes and what of them is the hair's own.
+#[inline(always)]
+fn shade(
+    interpolation: Interpolation,
+    plane: usize,
+    slices: usize,
+    f: f32x4,
+    at: impl Fn(usize) -> f32x4,
+    own: impl Fn(usize) -> f32x4,
+) -> f32x4 {
+    let (a, b) = (at(plane), at(plane + 1));
+    match interpolation {
+        Interpolation::OpticalDepth => exp_neg(a + (b - a) * f - own(0)),
+        Interpolation::Transmittance => {
+            let (a, b) = (exp_neg(a - own(0)), exp_neg(b - own(1)));
+            a + (b - a) * f
+        }
+        Interpolation::Cubic => {
+            let (a, b) = (a - own(1), b - own(2));
+            let before = if plane > 0 { at(plane - 1) - own(0) } else { a };
+            let after = if plane + 2 <= slices { at(plane + 2) - own(3) } else { b };
+            exp_neg(cubic(before, a, b, after, f))
+        }
     }
 }
 
