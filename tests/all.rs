@@ -6,6 +6,7 @@ mod depenetrate;
 mod determinism;
 mod foreign;
 mod golden;
+mod light;
 mod look;
 mod look_page;
 mod reference;

@@ -5,6 +5,7 @@ mod configuration;
 mod curves;
 mod edges;
 mod images;
+mod lights;
 mod look;
 mod motion;
 mod skins;

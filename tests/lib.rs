@@ -288,6 +288,32 @@ fn stored_zlib(data: &[u8]) -> Vec<u8> {
     out
 }
 
+/// The small shot under two lights: parallel light from above at every frame, and a spot that moves and is on from frame 2.
+pub fn lit_shot(command: &str, frames: u32) -> ShotFolder {
+    let shot = small_shot(command, frames);
+    let text = String::from_utf8(shot.read("pipeline.toml")).expect("text");
+    let lights = r#"
+[[light]]
+name = "key"
+kind = "directional"
+direction = [0.25, -1.0, 0.0]
+
+[[light]]
+name = "rim-2"
+kind = "spot"
+position = [{ frame = 1, value = [20.0, 0.0, 0.0] }, { frame = 3, value = [20.0, 4.0, 0.0] }]
+direction = [-1.0, 0.0, 0.0]
+cone = 40.0
+intensity = 3.0
+frames = [2, 100]
+
+[shadow]
+quality = "draft"
+"#;
+    shot.write("pipeline.toml", text + lights);
+    shot
+}
+
 /// The small shot with few hairs, all simulated; a checkpoint after every second frame.
 pub fn simulated_shot(command: &str, frames: u32) -> ShotFolder {
     let shot = small_shot(command, frames);

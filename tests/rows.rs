@@ -4,6 +4,7 @@
 use pelage_tests::{ExportedHair, ShotFolder, ascii_ply, deformed, exported_hairs, grey_png, small_shot};
 use std::collections::{BTreeMap, BTreeSet};
 
+mod light;
 mod look;
 
 const COMMAND: &str = env!("CARGO_BIN_EXE_pelage-under-test");
@@ -66,8 +67,9 @@ fn tally(steps: &BTreeSet<String>) -> BTreeMap<String, u64> {
     let once = |stage| (stage, u64::from(!of(stage).is_empty()));
     let each = |stage| (stage, of(stage).len() as u64);
     let frames = ("interpolate", frames.len() as u64);
-    let all = [once("groom"), once("instance"), ("simulate", simulated), frames, each("export"), each("preview")];
-    all.map(|(name, n)| (name.to_owned(), n)).into()
+    let steps = [frames, each("shadow"), each("export"), each("preview")];
+    let all = [once("groom"), once("instance"), ("simulate", simulated)].into_iter().chain(steps);
+    all.map(|(name, n)| (name.to_owned(), n)).collect()
 }
 
 /// The steps that run are these and no other, for these reasons and no other, and the results are right.
@@ -454,7 +456,15 @@ fn nothing_for_threads_and_verbosity() {
 fn a_forced_stage_runs_and_gives_the_same() {
     let shot = finished();
     let before = (shot.outputs(), shot.entries());
-    let all = [("groom", 1), ("instance", 1), ("simulate", 0), ("interpolate", 3), ("export", 2), ("preview", 1)];
+    let all = [
+        ("groom", 1),
+        ("instance", 1),
+        ("simulate", 0),
+        ("interpolate", 3),
+        ("shadow", 0),
+        ("export", 2),
+        ("preview", 1),
+    ];
     for (stage, n) in all.into_iter().filter(|s| s.1 > 0) {
         let report = shot.report(&["--force", stage]);
         let expected: BTreeMap<String, u64> = all.map(|(s, _)| (s.to_owned(), if s == stage { n } else { 0 })).into();
@@ -486,7 +496,7 @@ fn whole_shot_files_wait_for_every_frame() {
     let done = ran(&report);
     assert_eq!((done["interpolate"], done["export"], done["preview"]), (2, 0, 0));
     assert!(String::from_utf8_lossy(&out.stderr).contains("export/usd waits for frame 2\n"));
-    assert_eq!(report["stages"][4]["skipped"]["export/usd waiting for frames"], 1);
+    assert_eq!(report["stages"][5]["skipped"]["export/usd waiting for frames"], 1);
     assert!(shot.outputs().is_empty());
     let done = ran(&shot.report(&["--frames", "2"]));
     assert_eq!((done["interpolate"], done["export"], done["preview"]), (1, 2, 1));

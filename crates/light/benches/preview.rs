@@ -46,6 +46,7 @@ fn measure(hairs: usize, points: usize) {
         color: &[],
         opacity: &[],
         root_normal: &normal,
+        transmittance: &[],
     }];
     let (vertex, triangle) = ball(120);
     let smooth: Vec<[f32; 3]> = vertex.iter().map(|p| p.map(|v| v as f32)).collect();

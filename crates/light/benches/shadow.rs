@@ -53,7 +53,7 @@ fn errors(name: &str, groom: &Groom) {
     for filter in [1.0 / 512.0, 1.0 / 320.0, 1.0 / 192.0, 1.0 / 128.0] {
         row(ShadowSettings { filter, ..Default::default() });
     }
-    for quality in [Quality::Draft, Quality::Fine, Quality::Reference] {
+    for quality in [Quality::Draft, Quality::Fine] {
         row(quality.settings());
     }
 }

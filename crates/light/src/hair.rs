@@ -101,6 +101,8 @@ struct Knot {
     color: V3,
     /// Pixels per scene unit.
     scale: f32,
+    /// Which point of the layer it is.
+    index: usize,
 }
 
 /// Camera, picture and lights that strands are drawn with.
@@ -133,7 +135,7 @@ impl Draw<'_> {
                 }
                 let scale = self.view.scale(p.z.max(self.view.near)) as f32;
                 let color = layer.color(s, i);
-                let knot = Knot { p: p.cast(), m: V3::zeros(), width: layer.width(i), color, scale };
+                let knot = Knot { p: p.cast(), m: V3::zeros(), width: layer.width(i), color, scale, index: i };
                 let end = i + 1 == last;
                 let close = scratch.knot.last().is_some_and(|k| (knot.p - k.p).norm() * scale < MERGE);
                 if !close || end {
@@ -162,7 +164,7 @@ impl Draw<'_> {
         let lights = self.lighting.columns();
         scratch.depth.clear();
         for k in knot.iter() {
-            self.lighting.depths(k.p, V3::zeros(), &mut scratch.depth);
+            self.lighting.depths_of(k.p, layer.transmittance, k.index, &mut scratch.depth);
         }
         let opacity = layer.opacity(s);
         if opacity <= 0.0 {

@@ -43,6 +43,9 @@ pub struct HairView<'a> {
     pub opacity: &'a [f32],
     /// Unit normal of the skin at the root, one a strand (default none: shading by the hair's direction alone).
     pub root_normal: &'a [[f32; 3]],
+    /// For each light of the scene the part that arrives, one a point, in [0, 1], past hair and skin; empty: a cue by
+    /// coarse slabs instead.
+    pub transmittance: &'a [Vec<f32>],
 }
 
 /// What is drawn, and in what light.
@@ -147,6 +150,16 @@ fn not_nan(x: f32) -> f32 {
     if x.is_nan() { 0.0 } else { x }
 }
 
+/// Middle of the bounds of all hair and skin.
+fn middle(scene: &Scene) -> Vec3 {
+    let hair = scene.layers.iter().flat_map(|l| l.position.iter().map(|p| in_layer(l, p)));
+    let skin = scene.skin.iter().flat_map(|s| s.position.iter().map(|p| Vec3::from(*p)));
+    let none = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
+    let finite = hair.chain(skin).filter(|p| p.iter().all(|v| v.abs() < HUGE));
+    let (low, high) = finite.fold(none, |(low, high), p| (low.inf(&p), high.sup(&p)));
+    if low.x <= high.x { (low + high) * 0.5 } else { Vec3::zeros() }
+}
+
 /// Lights in camera space with their shadow cues.
 pub(crate) struct Lighting {
     lights: Vec<LightDir>,
@@ -162,12 +175,23 @@ impl Lighting {
     fn new(scene: &Scene, camera: &Camera, view: &View, settings: &Settings) -> Lighting {
         let toward: Vec<Vec3> = scene.lights.iter().map(to_light).collect();
         let lights = toward.iter().zip(scene.lights);
-        let up = to_light(&Light { direction: camera.up.map(|v| -v), color: [0.0; 3] });
+        let up = to_light(&Light { direction: camera.up.map(|v| -v), ..Light::default() });
+        // Shadows on the skin of a light nearby are those of one far away beyond it.
+        let middle = middle(scene);
+        let far = |(t, l): (&Vec3, &Light)| {
+            l.position.and_then(|p| (Vec3::from(p) - middle).try_normalize(0.0)).unwrap_or(*t)
+        };
+        let far: Vec<Vec3> = toward.iter().zip(scene.lights).map(far).collect();
         Lighting {
             lights: lights
-                .map(|(t, l)| LightDir { to_light: view.turn(*t).cast(), color: V3::from(l.color) })
+                .map(|(t, l)| LightDir {
+                    to_light: view.turn(*t).cast(),
+                    color: V3::from(l.color),
+                    position: l.position.map(|p| view.to_camera(Vec3::from(p)).cast()),
+                    cone: l.cone.map(|c| c.map(|a| libm::cos(a) as f32)),
+                })
                 .collect(),
-            slabs: toward.par_iter().map(|t| Slabs::new(scene, *t, view)).collect(),
+            slabs: far.par_iter().map(|t| Slabs::new(scene, *t, view)).collect(),
             model: HairModel::new(settings.hair),
             settings: *settings,
             up: view.turn(up).cast(),
@@ -189,6 +213,19 @@ impl Lighting {
         }
     }
 
+    /// The same for a point of a hair, from its light if that is known: a column for each light.
+    pub fn depths_of(&self, p: V3, known: &[Vec<f32>], i: usize, out: &mut Vec<f32>) {
+        if known.len() != self.lights.len() || known.iter().any(|c| i >= c.len()) {
+            return self.depths(p, V3::zeros(), out);
+        }
+        for column in known {
+            let t = column[i].clamp(0.0, 1.0);
+            // What is dark altogether is behind the skin: hair lets something through.
+            out.push(if t > 0.0 { -self.settings.shadow * libm::logf(t) } else { 0.0 });
+            out.push(f32::from(t > 0.0));
+        }
+    }
+
     fn eye(&self, p: V3) -> V3 {
         if self.parallel { -V3::z() } else { -p / p.norm().max(f32::MIN_POSITIVE) }
     }
@@ -206,7 +243,8 @@ impl Lighting {
         let mut sum = ambient;
         for (light, d) in self.lights.iter().zip(depth.chunks_exact(2)) {
             let through = color.map(|c| fade(d[0] * (1.0 - SCATTER * c)) * d[1]);
-            let sent = self.model.reflect(tangent, eye, light.to_light, normal, color);
+            let (toward, beam) = light.toward(p);
+            let sent = self.model.reflect(tangent, eye, toward, normal, color) * beam;
             sum += sent.component_mul(&light.color).component_mul(&through);
         }
         sum
@@ -218,7 +256,8 @@ impl Lighting {
         self.depths(p, n, &mut depth);
         let mut sum = V3::from(self.settings.ambient) * (self.ambient(&depth) * (0.75 + 0.25 * n.dot(&self.up)));
         for (light, d) in self.lights.iter().zip(depth.chunks_exact(2)) {
-            sum += light.color * (n.dot(&light.to_light).max(0.0) * fade(d[0]) * d[1]);
+            let (toward, beam) = light.toward(p);
+            sum += light.color * (n.dot(&toward).max(0.0) * beam * fade(d[0]) * d[1]);
         }
         sum.component_mul(&color)
     }

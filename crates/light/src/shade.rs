@@ -3,20 +3,28 @@
 use crate::{Camera, V3};
 use pelage_geom::Vec3;
 
-/// A light far away.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A light. Its strength is what arrives: it does not fall off with distance.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Light {
-    /// The way the light travels, towards the scene, in scene space; any length but zero.
+    /// The way the light travels, towards the scene, in scene space; any length but zero. Of a light at a position: the
+    /// middle of its cone, if it has one.
     pub direction: [f64; 3],
     /// Linear colour times strength: 1 on a surface at right angles to the light shows its own colour.
     pub color: [f32; 3],
+    /// Where it stands, scene space; `None`: far away.
+    pub position: Option<[f64; 3]>,
+    /// Half angles of the full beam and of its border, radians; `None`: to all sides.
+    pub cone: Option<[f64; 2]>,
 }
 
 /// Key from above left, fill from the right, rim from behind: three lights that move with the camera.
 pub fn studio_lights(camera: &Camera) -> Vec<Light> {
     let axis = camera.view(1, 1).axis;
-    let light =
-        |x: f64, y: f64, z: f64, color| Light { direction: (axis[0] * x + axis[1] * y + axis[2] * z).into(), color };
+    let light = |x: f64, y: f64, z: f64, color| Light {
+        direction: (axis[0] * x + axis[1] * y + axis[2] * z).into(),
+        color,
+        ..Light::default()
+    };
     vec![
         light(0.55, 0.75, 0.75, [1.30, 1.22, 1.12]),
         light(-0.8, 0.1, 0.75, [0.30, 0.32, 0.37]),
@@ -69,10 +77,29 @@ impl Default for HairShade {
 /// A light as the shading wants it: camera space.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LightDir {
-    /// Unit, towards the light.
+    /// Unit, against the way the light travels.
     pub to_light: V3,
     /// Linear colour times strength.
     pub color: V3,
+    /// Where it stands, unless it is far away.
+    pub position: Option<V3>,
+    /// Cosines of the full beam and of its border.
+    pub cone: Option<[f32; 2]>,
+}
+
+impl LightDir {
+    /// Unit vector from a point to the light, and the part of the beam that is sent that way.
+    pub fn toward(&self, p: V3) -> (V3, f32) {
+        let Some(position) = self.position else { return (self.to_light, 1.0) };
+        let way = position - p;
+        let r = way.norm();
+        let t = if r > 0.0 { way / r } else { self.to_light };
+        let Some([full, border]) = self.cone else { return (t, 1.0) };
+        let cos = t.dot(&self.to_light);
+        let x =
+            if full > border { ((cos - border) / (full - border)).clamp(0.0, 1.0) } else { f32::from(cos >= border) };
+        (t, x * x * (3.0 - 2.0 * x))
+    }
 }
 
 /// Constants of [`HairShade`], worked out once.

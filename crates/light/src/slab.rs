@@ -236,6 +236,7 @@ mod tests {
             color: &[],
             opacity: &vec![opacity; n],
             root_normal: &[],
+            transmittance: &[],
         }];
         let scene = Scene { skin: None, layers: &layers, lights: &[], background: [0.0; 3] };
         let camera = Camera {

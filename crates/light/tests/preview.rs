@@ -31,6 +31,7 @@ impl Hairs {
             color: &self.color,
             opacity: &self.opacity,
             root_normal: &[],
+            transmittance: &[],
         }
     }
 
@@ -155,7 +156,7 @@ fn a_mirrored_scene_is_a_mirrored_picture() {
     for p in &mut other.position {
         p[0] = -p[0];
     }
-    let lights = [Light { direction: [0.0, -1.0, -1.0], color: [1.0; 3] }];
+    let lights = [Light { direction: [0.0, -1.0, -1.0], color: [1.0; 3], ..Light::default() }];
     let (position, triangle) = square(30.0, -10.0);
     let skin = SkinView { position: &position, triangle: &triangle, normal: &[], color: [0.6, 0.5, 0.4] };
     // Samples of a pixel and texels of the skin are not symmetric, so its border and its shadow's differ in places.
@@ -266,7 +267,7 @@ fn no_dark_dots_on_a_lit_outline() {
     let position: Vec<[f64; 3]> = normal.iter().map(|n| n.map(|v| 50.0 * v)).collect();
     let normal: Vec<[f32; 3]> = normal.iter().map(|n| n.map(|v| v as f32)).collect();
     let skin = SkinView { position: &position, triangle: &triangle, normal: &normal, color: [0.9; 3] };
-    let lights = [Light { direction: [0.0, -1.0, 0.0], color: [1.0; 3] }];
+    let lights = [Light { direction: [0.0, -1.0, 0.0], color: [1.0; 3], ..Light::default() }];
     let settings = Settings { ambient: [0.0; 3], ..Settings::default() };
     let image = Hairs::default().render(Some(skin), &lights, [0.9; 3], &settings);
     // Everything higher than sin 45 degrees above the middle.
@@ -304,7 +305,7 @@ fn depth_decides_not_the_order_of_input() {
 
 #[test]
 fn hair_in_the_shadow_of_hair_or_skin_is_darker() {
-    let lights = [Light { direction: [0.0, -1.0, 0.0], color: [1.0; 3] }];
+    let lights = [Light { direction: [0.0, -1.0, 0.0], color: [1.0; 3], ..Light::default() }];
     let settings = Settings { ambient: [0.0; 3], ..Settings::default() };
     let probe = |roof: bool, skin: Option<SkinView>| {
         let mut hairs = Hairs::default();
@@ -350,7 +351,7 @@ fn colours_of_points_run_along_the_hair() {
     let one = tuft(60);
     let mut each = one.clone();
     each.color = one.counts.iter().zip(&one.color).flat_map(|(n, c)| std::iter::repeat_n(*c, *n)).collect();
-    let lights = [Light { direction: [0.3, -1.0, -0.5], color: [2.0; 3] }];
+    let lights = [Light { direction: [0.3, -1.0, -0.5], color: [2.0; 3], ..Light::default() }];
     let picture = |h: &Hairs| h.render(None, &lights, [0.0; 3], &Settings::default());
     assert_eq!(picture(&one).rgb, picture(&each).rgb);
     // Of a straight hair with colours at its points, a pixel has what lies between its neighbours.
@@ -386,11 +387,12 @@ fn bad_input_is_counted_and_passed_over() {
         color: &[[f32::NAN, 2.0, -1.0]],
         opacity: &[f32::NAN, 7.0],
         root_normal: &[[0.0; 3], [f32::NAN; 3]],
+        transmittance: &[],
     };
     let vertex = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [f64::NAN, 0.0, 0.0], [2.0, 0.0, 0.0]];
     let triangle = [[0, 1, 2], [0, 1, 3], [0, 1, 9], [0, 1, 4], [1, 1, 1]];
     let skin = SkinView { position: &vertex, triangle: &triangle, normal: &[[0.0; 3]], color: [0.5; 3] };
-    let lights = [Light { direction: [0.0; 3], color: [1.0; 3] }];
+    let lights = [Light { direction: [0.0; 3], color: [1.0; 3], ..Light::default() }];
     let scene = Scene { skin: Some(skin), layers: &[layer], lights: &lights, background: [0.1; 3] };
     for camera in [flat_camera(), Camera { parallel_height: None, ..flat_camera() }] {
         let (image, counts) = render(&scene, &camera, 160, 130, &Settings::default());
@@ -417,6 +419,7 @@ fn hair_through_the_eye_is_cut_at_the_near_plane() {
         color: &hairs.color,
         opacity: &[],
         root_normal: &[],
+        transmittance: &[],
     };
     let camera = Camera { parallel_height: None, ..flat_camera() };
     let scene = Scene { skin: None, layers: &[layer], lights: &[], background: [0.0; 3] };

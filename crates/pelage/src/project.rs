@@ -159,7 +159,7 @@ impl Project {
         let curves = curves.map(|c| find.file(&shot, "groom.curves", c)).transpose()?;
         let motion = find.motion(&shot)?;
         let [frames, before] = find.frames(&shot, motion.as_ref())?;
-        let bodies = if simulated { find.bodies(&shot)? } else { Vec::new() };
+        let bodies = if simulated || !shot.value.light.is_empty() { find.bodies(&shot)? } else { Vec::new() };
         let drawn = groom.value.control.placement.curves.as_ref();
         let drawn = drawn.map(|p| find.file(&groom, "control.placement.curves", p)).transpose()?;
         let emitters = groom.value.emitter.iter().enumerate();

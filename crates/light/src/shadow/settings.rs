@@ -45,8 +45,6 @@ pub enum Quality {
     Default,
     /// For hair that is seen close.
     Fine,
-    /// The finest map that is measured; the exact reference is [`super::transmittance_exact`].
-    Reference,
 }
 
 impl Quality {
@@ -56,7 +54,6 @@ impl Quality {
             Quality::Draft => (512, 32),
             Quality::Default => (1024, 96),
             Quality::Fine => (2048, 128),
-            Quality::Reference => (4096, 256),
         };
         ShadowSettings { texels, slices, ..ShadowSettings::default() }
     }

@@ -1,15 +1,17 @@
 //! Preview: pictures of the hair by which a groom is judged.
 
 use super::look::Displaced;
+use super::plan_light::source;
 use super::run::Runner;
-use super::{SkinPose, What, curves, export, groom, instance, interpolate};
+use super::{SkinPose, What, curves, export, groom, instance, interpolate, shadow};
 use crate::Error;
 use crate::config::UpAxis;
 use crate::files::unfinished;
 use crate::format::{HairLayer, image::write_png};
 use pelage_geom::{Offsets, SurfacePoint};
+use pelage_light::shadow::Source;
 use pelage_light::{
-    Camera, HairView, Image, Region, Scene, Settings, SkinView, contact_sheet, render_region, studio_lights,
+    Camera, HairView, Image, Light, Region, Scene, Settings, SkinView, contact_sheet, render_region, studio_lights,
 };
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -212,6 +214,7 @@ fn draw(
             None => Ok(Vec::new()),
         })
         .collect::<Result<Vec<Vec<[f32; 3]>>, Error>>()?;
+    let (lights, lit) = lights(run, drawn, camera, frame)?;
     let views: Vec<HairView<'_>> = (0..layers.len())
         .map(|i| HairView {
             offsets: &layers[i].offsets,
@@ -221,9 +224,9 @@ fn draw(
             color: &layers[i].color,
             opacity: if wet[i].1.is_empty() { &layers[i].opacity } else { &wet[i].1 },
             root_normal: &normals[i],
+            transmittance: &lit[i],
         })
         .collect();
-    let lights = studio_lights(camera);
     let skin = if pose.is_some() { Some(groom::skin(run)?) } else { None };
     let surface = pose.as_ref().zip(skin.as_ref()).map(|(pose, skin)| SkinView {
         position: &pose.position,
@@ -233,6 +236,46 @@ fn draw(
     });
     let scene = Scene { skin: surface, layers: &views, lights: &lights, background: BACKGROUND };
     Ok(render_region(&scene, camera, size.map(|x| x as usize), region, &Settings::default()).0)
+}
+
+/// The lights of a frame with what arrives of each at the hairs that are drawn; three that move with the camera where the
+/// shot has none.
+fn lights(
+    run: &mut Runner<'_>,
+    drawn: &Drawn,
+    camera: &Camera,
+    frame: i32,
+) -> Result<(Vec<Light>, Vec<Vec<Vec<f32>>>), Error> {
+    let mut lit: Vec<Vec<Vec<f32>>> = vec![Vec::new(); drawn.layers.len()];
+    if run.project.shot.value.light.is_empty() {
+        return Ok((studio_lights(camera), lit));
+    }
+    let mut lights = Vec::new();
+    for (l, light) in run.project.shot.value.light.iter().enumerate().filter(|(_, l)| l.is_on(frame)) {
+        let strength = light.intensity.at(f64::from(frame));
+        let color = light.color.map(|c| (c * strength) as f32);
+        lights.push(match source(light, frame) {
+            Source::Directional { direction } => Light { direction: direction.into(), color, ..Light::default() },
+            Source::Point { position } => Light { position: Some(position.into()), color, ..Light::default() },
+            Source::Spot { position, direction, cone, softness } => Light {
+                direction: direction.into(),
+                color,
+                position: Some(position.into()),
+                cone: Some([cone, cone + softness]),
+            },
+        });
+        for (i, column) in shadow::columns(run, l, frame)?.into_iter().enumerate() {
+            let offsets = match drawn.every {
+                1 => None,
+                _ => Some(export::thickness(run, i)?.offsets),
+            };
+            lit[i].push(match offsets {
+                Some(offsets) => nth(&column, &offsets, drawn.every).collect(),
+                None => column,
+            });
+        }
+    }
+    Ok((lights, lit))
 }
 
 fn save(run: &mut Runner<'_>, what: What, name: &str, picture: &Image) -> Result<(), Error> {
