@@ -80,6 +80,34 @@ pub(crate) struct Segment {
     pub thickness: f32,
 }
 
+impl Segment {
+    /// The part that may reach a square of `side` texels from zero on. Slices are placed for what lies over a tile: where
+    /// the rest of a long segment lies says nothing, and depths between its ends would be taken for slices between theirs.
+    pub fn over(&self, side: f32) -> Option<Segment> {
+        let (a, b, margin) = (self.a, self.b, 0.5 * self.width + 1.0);
+        let (mut from, mut to) = (0.0f32, 1.0f32);
+        for i in 0..2 {
+            let (low, high) = (a[i].min(b[i]), a[i].max(b[i]));
+            if low >= -margin && high <= side + margin {
+                continue;
+            }
+            if low > side + margin || high < -margin {
+                return None;
+            }
+            let inverse = 1.0 / (b[i] - a[i]);
+            let (u, v) = ((-margin - a[i]) * inverse, (side + margin - a[i]) * inverse);
+            from = from.max(u.min(v));
+            to = to.min(u.max(v));
+        }
+        let at = |t: f32| std::array::from_fn(|i| a[i] + (b[i] - a[i]) * t);
+        (from < to).then(|| Segment {
+            a: if from > 0.0 { at(from) } else { a },
+            b: if to < 1.0 { at(to) } else { b },
+            ..*self
+        })
+    }
+}
+
 impl Chunk {
     /// Points of the chunk that tile `t` has to look at.
     pub fn tile(&self, t: usize) -> &[u32] {

@@ -125,6 +125,7 @@ impl<'a> Work<'a> {
         let (mut from, mut to) = (f32::INFINITY, f32::NEG_INFINITY);
         let shift = |p: [f32; 3]| [p[0] - low[0], p[1] - low[1], p[2]];
         let top = self.projection.texels as f32 - 0.001;
+        let side = self.volume.side() as f32;
         let mut word = [0u32; AHEAD];
         for chunk in chunks {
             for list in chunk.tile(t).chunks(AHEAD) {
@@ -146,7 +147,8 @@ impl<'a> Work<'a> {
                         }
                     }
                     if let Some(s) = chunk.segment(k, &layers[chunk.layer], self.projection) {
-                        self.segment.push(Cast { segment: Segment { a: shift(s.a), b: shift(s.b), ..s }, strand });
+                        let s = Segment { a: shift(s.a), b: shift(s.b), ..s };
+                        self.segment.extend(s.over(side).map(|segment| Cast { segment, strand }));
                     }
                 }
             }
