@@ -276,12 +276,14 @@ mod tests {
 
     #[test]
     fn hairs_side_by_side_have_the_axes_of_each() {
-        struct Set<'a>(&'a mut Beside, &'a Block, &'a [RootAxes], &'a Group);
+        struct Set<'a>(&'a mut Beside, &'a [[f32; 3]], &'a [RootAxes], &'a Group);
         impl Kernel for Set<'_> {
             type Out = ();
             #[inline(always)]
             fn run<L: Lanes>(self) {
-                self.0.set::<L>(self.1, self.3.roots(self.2));
+                let mut block = Block::new(30);
+                block.load::<L>(self.1, self.3);
+                self.0.set::<L>(&block, self.3.roots(self.2));
             }
         }
         let last = LANES as u64 - 1;
@@ -291,10 +293,8 @@ mod tests {
         let axes: Vec<RootAxes> = all.chunks_exact(30).map(root).collect();
         let lane: [usize; LANES] = std::array::from_fn(|l| l);
         let group = Group::new(0, &lane);
-        let mut block = Block::new(30);
-        block.load(&all, &group);
         let mut beside = Beside::new(30);
-        run(Set(&mut beside, &block, &axes, &group));
+        run(Set(&mut beside, &all, &axes, &group));
         for l in 0..LANES {
             let mut one = Along::default();
             one.set(&all[l * 30..][..30], &axes[l]);

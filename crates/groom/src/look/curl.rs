@@ -180,11 +180,11 @@ impl Kernel for Chunk<'_> {
             for hairs in todo.chunks(LANES) {
                 let mut group = Group::new(first, hairs);
                 let own = Own::<L>::new(&self, &group);
-                s.block.load(self.hairs, &group);
+                s.block.load::<L>(self.hairs, &group);
                 if !c.keep_length {
                     s.along.set(&s.block, own.root);
                     own.displace(&s.along, &mut s.block);
-                    s.block.store(&group, self.hairs);
+                    s.block.store::<L>(&group, self.hairs);
                     continue;
                 }
                 let mut at = Pack::default();
@@ -200,7 +200,7 @@ impl Kernel for Chunk<'_> {
                         group.used[l] = false;
                     }
                 }
-                s.block.store(&group, self.hairs);
+                s.block.store::<L>(&group, self.hairs);
             }
             std::mem::swap(&mut todo, &mut again);
             again.clear();
@@ -347,7 +347,7 @@ impl<'a, L: Lanes> Own<'a, L> {
         let curled = self.displace(&s.along, &mut s.block);
         let scale = L::if_gt(curled, zero, total / curled, one);
         let root = V::<L>::load(&s.block.point[0]);
-        for p in &mut s.block.point {
+        for p in s.block.point.iter_mut().skip(1) {
             (root + (V::load(p) - root).times(scale)).store(p);
         }
         let off = (curled - total) / total;

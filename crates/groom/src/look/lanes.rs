@@ -258,6 +258,14 @@ pub(crate) fn perlin3<L: Lanes>(key: u32, p: V<L>) -> [L; 2] {
     [sum[0] * scale, sum[1] * scale]
 }
 
+/// Where the tiles begin that `n` numbers of a hair are handled in, as many numbers as there are lanes; the last overlaps
+/// the one before it. None where a hair is shorter than a tile.
+#[inline(always)]
+fn tiles(n: usize) -> impl Iterator<Item = usize> {
+    let count = if n < LANES { 0 } else { n.div_ceil(LANES) };
+    (0..count).map(move |i| (i * LANES).min(n - LANES))
+}
+
 /// Hairs side by side: point k of all lanes.
 #[derive(Debug)]
 pub(crate) struct Block {
@@ -272,27 +280,54 @@ impl Block {
 
     /// Takes the group's hairs from those of the task.
     #[inline(always)]
-    pub fn load(&mut self, hairs: &[[f32; 3]], group: &Group) {
-        let points = self.point.len();
-        for l in 0..LANES {
-            let hair = &hairs[group.lane[l] * points..][..points];
-            for (p, v) in self.point.iter_mut().zip(hair) {
-                set(p, l, *v);
+    pub fn load<L: Lanes>(&mut self, hairs: &[[f32; 3]], group: &Group) {
+        let (row, hairs) = (self.point.as_flattened_mut(), hairs.as_flattened());
+        let n = row.len();
+        let hair = |l: usize| group.lane[l] * n;
+        for first in tiles(n) {
+            let mut tile = [L::splat(0.0); LANES];
+            for l in 0..LANES {
+                tile[l] = L::read(hairs[hair(l) + first..].first_chunk().expect("a tile lies within its hair"));
+            }
+            let tile = L::turned(tile);
+            let row = &mut row[first..first + LANES];
+            for k in 0..LANES {
+                tile[k].store(&mut row[k]);
+            }
+        }
+        if n < LANES {
+            for l in 0..LANES {
+                for (row, x) in row.iter_mut().zip(&hairs[hair(l)..][..n]) {
+                    row.0[l] = *x;
+                }
             }
         }
     }
 
-    /// Writes the group's hairs back; roots stay.
+    /// Writes the group's hairs back.
     #[inline(always)]
-    pub fn store(&self, group: &Group, hairs: &mut [[f32; 3]]) {
-        let points = self.point.len();
-        for l in 0..LANES {
-            if !group.used[l] {
-                continue;
+    pub fn store<L: Lanes>(&self, group: &Group, hairs: &mut [[f32; 3]]) {
+        let (row, hairs) = (self.point.as_flattened(), hairs.as_flattened_mut());
+        let n = row.len();
+        let hair = |l: usize| group.lane[l] * n;
+        for first in tiles(n) {
+            let (mut tile, row) = ([L::splat(0.0); LANES], &row[first..first + LANES]);
+            for k in 0..LANES {
+                tile[k] = L::load(&row[k]);
             }
-            let hair = &mut hairs[group.lane[l] * points..][..points];
-            for (v, p) in hair.iter_mut().zip(&self.point).skip(1) {
-                *v = [p[0].0[l], p[1].0[l], p[2].0[l]];
+            let tile = L::turned(tile);
+            for l in 0..LANES {
+                if group.used[l] {
+                    let to = hairs[hair(l) + first..].first_chunk_mut().expect("a tile lies within its hair");
+                    tile[l].write(to);
+                }
+            }
+        }
+        if n < LANES {
+            for l in (0..LANES).filter(|l| group.used[*l]) {
+                for (row, x) in row.iter().zip(&mut hairs[hair(l)..][..n]) {
+                    *x = row.0[l];
+                }
             }
         }
     }
@@ -396,25 +431,34 @@ mod tests {
 
     #[test]
     fn a_block_gives_back_what_it_took() {
-        struct Relay<'a>(&'a mut Block, &'a [Pack]);
-        impl Kernel for Relay<'_> {
-            type Out = ();
+        struct Through<'a>(&'a Group, &'a [[f32; 3]], &'a mut [[f32; 3]], usize);
+        impl Kernel for Through<'_> {
+            type Out = Block;
             #[inline(always)]
-            fn run<L: Lanes>(self) {
-                self.0.relay::<L>(self.1);
+            fn run<L: Lanes>(self) -> Block {
+                let mut block = Block::new(self.3);
+                block.load::<L>(self.1, self.0);
+                block.store::<L>(self.0, self.2);
+                let mut arc = vec![Pack::default(); self.3];
+                for k in 0..self.3 {
+                    arc[k] = Pack([2.0 * k as f32; LANES]);
+                }
+                block.relay::<L>(&arc);
+                block
             }
         }
-        let hairs: Vec<[f32; 3]> = (0..15).map(|i| [i as f32, 1.0, -0.0]).collect();
-        let mut block = Block::new(5);
-        let mut group = Group::new(0, &[0, 1, 2]);
-        block.load(&hairs, &group);
-        let mut out = vec![[9.0; 3]; 15];
-        group.used[1] = false;
-        block.store(&group, &mut out);
-        assert!(out[1..5] == hairs[1..5] && out[11..] == hairs[11..] && out[5..10].iter().all(|p| *p == [9.0; 3]));
-        let arc: Vec<Pack> = (0..5).map(|k| Pack([2.0 * k as f32; LANES])).collect();
-        run(Relay(&mut block, &arc));
-        let end = |x: usize, l: usize| block.point[4][x].0[l] - block.point[0][x].0[l];
-        assert!((0..LANES).all(|l| (end(0, l) - 8.0).abs() < 1e-5 && end(1, l) == 0.0));
+        for points in [2, 5, 6, 12, 23] {
+            let hairs: Vec<[f32; 3]> = (0..3 * points).map(|i| [i as f32, 1.0, -0.0]).collect();
+            let mut group = Group::new(0, &[0, 1, 2]);
+            group.used[1] = false;
+            let mut out = vec![[9.0; 3]; 3 * points];
+            let block = run(Through(&group, &hairs, &mut out, points));
+            let (first, last) = (0..points, 2 * points..3 * points);
+            assert!(out[first.clone()] == hairs[first] && out[last.clone()] == hairs[last], "{points}");
+            assert!(out[points..2 * points].iter().all(|p| *p == [9.0; 3]));
+            let along = |x: usize, l: usize| block.point[points - 1][x].0[l] - block.point[0][x].0[l];
+            let length = 2.0 * (points - 1) as f32;
+            assert!((0..LANES).all(|l| (along(0, l) - length).abs() < 1e-5 && along(1, l) == 0.0));
+        }
     }
 }

@@ -71,7 +71,7 @@ impl Kernel for Chunk<'_> {
         let todo: Vec<usize> = (0..self.hairs.len() / points).filter(moves).collect();
         for hairs in todo.chunks(LANES) {
             let group = Group::new(self.first, hairs);
-            block.load(self.hairs, &group);
+            block.load::<L>(self.hairs, &group);
             along.set::<L>(&block, group.roots(n.axes));
             let amplitude: L = group.param(&n.amplitude);
             let (mut own, mut root) = ([0; LANES], V::splat([0.0; 3]));
@@ -102,7 +102,7 @@ impl Kernel for Chunk<'_> {
             if n.keep_length {
                 block.relay::<L>(&along.arc);
             }
-            block.store(&group, self.hairs);
+            block.store::<L>(&group, self.hairs);
         }
     }
 }

@@ -31,6 +31,12 @@ pub(crate) trait Lanes:
     fn load(p: &Pack) -> Self;
     /// To memory.
     fn store(self, p: &mut Pack);
+    /// From memory that lies anywhere.
+    fn read(p: &[f32; LANES]) -> Self;
+    /// To memory that lies anywhere.
+    fn write(self, p: &mut [f32; LANES]);
+    /// Rows as columns.
+    fn turned(rows: [Self; LANES]) -> [Self; LANES];
     /// In each lane the number of that lane in row `k` of `rows` (the last row for greater `k`).
     fn pick(rows: &[Pack], k: Self::Bits) -> Self;
     /// Square root.
@@ -125,6 +131,24 @@ impl Lanes for Plain {
     #[inline(always)]
     fn store(self, p: &mut Pack) {
         p.0 = self.0;
+    }
+    #[inline(always)]
+    fn read(p: &[f32; LANES]) -> Self {
+        Plain(*p)
+    }
+    #[inline(always)]
+    fn write(self, p: &mut [f32; LANES]) {
+        *p = self.0;
+    }
+    #[inline(always)]
+    fn turned(rows: [Self; LANES]) -> [Self; LANES] {
+        let mut out = rows;
+        for l in 0..LANES {
+            for k in 0..LANES {
+                out[k].0[l] = rows[l].0[k];
+            }
+        }
+        out
     }
     #[inline(always)]
     fn pick(rows: &[Pack], k: PlainBits) -> Self {
@@ -244,6 +268,50 @@ mod wide {
         rows.len() as u32 - 1
     }
 
+    /// Rows as columns: interleaving the first half of the rows with the second takes the highest digit of a row's index
+    /// (in binary) to the end of the column's, and that of the column's to the end of the row's; four times, and they have
+    /// changed places.
+    macro_rules! turned {
+        ($rows:ident) => {{
+            let mut rows = $rows;
+            for _ in 0..LANES.ilog2() {
+                let from = rows;
+                for i in 0..LANES / 2 {
+                    let [even, odd] = from[i].interleaved(from[i + LANES / 2]);
+                    rows[2 * i] = even;
+                    rows[2 * i + 1] = odd;
+                }
+            }
+            rows
+        }};
+    }
+
+    impl W512 {
+        /// Numbers of two rows in turns, as two rows.
+        #[inline(always)]
+        fn interleaved(self, o: Self) -> [Self; 2] {
+            unsafe {
+                let low = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+                let high = _mm512_setr_epi32(8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
+                let of = |index| W512(_mm512_permutex2var_ps(self.0, index, o.0));
+                [of(low), of(high)]
+            }
+        }
+    }
+
+    impl W256 {
+        /// Numbers of two rows in turns, as two rows.
+        #[inline(always)]
+        fn interleaved(self, o: Self) -> [Self; 2] {
+            unsafe {
+                let (a, b) = (_mm256_unpacklo_ps(self.0, o.0), _mm256_unpackhi_ps(self.0, o.0));
+                let (c, d) = (_mm256_unpacklo_ps(self.1, o.1), _mm256_unpackhi_ps(self.1, o.1));
+                let low = W256(_mm256_permute2f128_ps::<0x20>(a, b), _mm256_permute2f128_ps::<0x31>(a, b));
+                [low, W256(_mm256_permute2f128_ps::<0x20>(c, d), _mm256_permute2f128_ps::<0x31>(c, d))]
+            }
+        }
+    }
+
     const LANE: [u32; LANES] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
     impl Lanes for W512 {
@@ -259,6 +327,18 @@ mod wide {
         #[inline(always)]
         fn store(self, p: &mut Pack) {
             unsafe { _mm512_store_ps(p.0.as_mut_ptr(), self.0) }
+        }
+        #[inline(always)]
+        fn read(p: &[f32; LANES]) -> Self {
+            unsafe { W512(_mm512_loadu_ps(p.as_ptr())) }
+        }
+        #[inline(always)]
+        fn write(self, p: &mut [f32; LANES]) {
+            unsafe { _mm512_storeu_ps(p.as_mut_ptr(), self.0) }
+        }
+        #[inline(always)]
+        fn turned(rows: [Self; LANES]) -> [Self; LANES] {
+            turned!(rows)
         }
         #[inline(always)]
         fn pick(rows: &[Pack], k: B512) -> Self {
@@ -338,6 +418,21 @@ mod wide {
                 _mm256_store_ps(p.0.as_mut_ptr(), self.0);
                 _mm256_store_ps(p.0.as_mut_ptr().add(8), self.1);
             }
+        }
+        #[inline(always)]
+        fn read(p: &[f32; LANES]) -> Self {
+            unsafe { W256(_mm256_loadu_ps(p.as_ptr()), _mm256_loadu_ps(p.as_ptr().add(8))) }
+        }
+        #[inline(always)]
+        fn write(self, p: &mut [f32; LANES]) {
+            unsafe {
+                _mm256_storeu_ps(p.as_mut_ptr(), self.0);
+                _mm256_storeu_ps(p.as_mut_ptr().add(8), self.1);
+            }
+        }
+        #[inline(always)]
+        fn turned(rows: [Self; LANES]) -> [Self; LANES] {
+            turned!(rows)
         }
         #[inline(always)]
         fn pick(rows: &[Pack], k: B256) -> Self {
@@ -548,6 +643,30 @@ mod tests {
             for w in Width::ALL {
                 assert_eq!(bits(w), plain, "{w:?}");
             }
+        }
+    }
+
+    #[test]
+    fn rows_become_columns_at_every_width() {
+        struct Turn(Vec<[f32; LANES]>);
+        impl Kernel for Turn {
+            type Out = Vec<[f32; LANES]>;
+            #[inline(always)]
+            fn run<L: Lanes>(mut self) -> Self::Out {
+                let mut rows = [L::splat(0.0); LANES];
+                for k in 0..LANES {
+                    rows[k] = L::read(&self.0[k]);
+                }
+                for (row, to) in L::turned(rows).into_iter().zip(&mut self.0) {
+                    row.write(to);
+                }
+                self.0
+            }
+        }
+        let rows: Vec<[f32; LANES]> = (0..LANES).map(|k| std::array::from_fn(|l| (100 * k + l) as f32)).collect();
+        for w in Width::ALL {
+            let turned = run_at(w, Turn(rows.clone()));
+            assert!((0..LANES).all(|k| (0..LANES).all(|l| turned[l][k] == rows[k][l])), "{w:?}");
         }
     }
 

@@ -144,7 +144,7 @@ impl Kernel for Chunk<'_> {
             let group = Group::new(self.first, hairs);
             let x = OwnLanes::<L>::new(self.own, 0, &group);
             let y = OwnLanes::<L>::new(self.own, 1, &group);
-            block.load(self.hairs, &group);
+            block.load::<L>(self.hairs, &group);
             let total = along.set::<L>(&block, group.roots(w.axes)).max(L::splat(f32::MIN_POSITIVE));
             for (k, stations) in self.stations.iter().enumerate().skip(1) {
                 let l = L::load(&along.arc[k]) / total;
@@ -155,7 +155,7 @@ impl Kernel for Chunk<'_> {
             if w.keep_length {
                 block.relay::<L>(&along.arc);
             }
-            block.store(&group, self.hairs);
+            block.store::<L>(&group, self.hairs);
         }
     }
 }

@@ -78,7 +78,7 @@ impl Kernel for Chunk<'_> {
         let todo: Vec<usize> = (0..self.hairs.len() / points).filter(moves).collect();
         for hairs in todo.chunks(LANES) {
             let group = Group::new(self.first, hairs);
-            block.load(self.hairs, &group);
+            block.load::<L>(self.hairs, &group);
             arc.set_arc::<L>(&block);
             let amplitude: L = group.param(&w.amplitude);
             let ([x, y, z], size) = (group.vectors::<L>(w.root).0, L::splat(w.size));
@@ -94,7 +94,7 @@ impl Kernel for Chunk<'_> {
                 moved.store(&mut block.point[k]);
             }
             block.relay::<L>(&arc.arc);
-            block.store(&group, self.hairs);
+            block.store::<L>(&group, self.hairs);
         }
     }
 }
