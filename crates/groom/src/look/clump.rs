@@ -8,7 +8,7 @@
 //! smooth.
 
 use super::axes::{self, RootAxes};
-use super::lanes::{Kernel, LANES, Lanes, run};
+use super::lanes::{Kernel, LANES, Lanes, fetch, run};
 use super::{CHUNK, Param, V3, at_station, lengths, relay, station_weights};
 use pelage_geom::rng::{channel, uniform};
 use pelage_geom::{NONE, StrandId};
@@ -89,6 +89,10 @@ pub fn clump(points: usize, c: &Clump, line: &[[f32; 3]], position: &mut [[f32; 
         run(Chunk { clump: c, line, along, stations: &stations, points, first, hairs });
     });
 }
+
+/// Hairs before its turn that the line of a hair's clump is asked for. Below about 4 it comes too late; above some
+/// hundred it may be gone again.
+const AHEAD: usize = 12;
 
 /// What acts at the points of every hair, for each of a point's three coordinates.
 #[derive(Clone, Copy)]
@@ -173,6 +177,10 @@ impl Kernel for Chunk<'_> {
         let (c, points, along) = (self.clump, self.points, self.along);
         let (mut size_along, mut length) = (vec![0.0f32; 3 * points], Vec::new());
         for (h, hair) in (self.first..).zip(self.hairs.chunks_exact_mut(points)) {
+            // Lines lie anywhere in memory: without this, hairs of few points wait for them.
+            if let Some(&own) = c.clump.get(h + AHEAD).filter(|own| **own != NONE) {
+                fetch(self.line[own as usize * points..][..points].as_flattened());
+            }
             let own = c.clump[h];
             if own == NONE || c.centre[own as usize] as usize == h {
                 continue;

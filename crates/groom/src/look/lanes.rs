@@ -4,7 +4,7 @@
 
 use super::Param;
 use super::axes::RootAxes;
-pub(crate) use super::registers::{Bits, Kernel, LANES, Lanes, Pack, run};
+pub(crate) use super::registers::{Bits, Kernel, LANES, Lanes, Pack, fetch, run};
 use std::ops::{Add, Sub};
 
 /// A vector in every lane, as it lies in memory.
