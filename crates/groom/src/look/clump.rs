@@ -120,10 +120,10 @@ impl Draw<'_> {
     fn run<L: Lanes>(&self, hair: &mut [f32]) {
         let n = hair.len();
         if n < 3 + LANES {
-            for k in 3..n {
-                let a = &self.along;
+            let a = &self.along;
+            for (k, x) in hair.iter_mut().enumerate().skip(3) {
                 let d = self.percent * (a.straight[k] + self.rate * a.bent[k]) * (1.0 - self.open * a.splay[k]);
-                hair[k] = hair[k] * (1.0 - d) + self.line[k] * d;
+                *x = *x * (1.0 - d) + self.line[k] * d;
             }
             return;
         }

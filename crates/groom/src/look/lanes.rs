@@ -2,6 +2,9 @@
 //!
 //! All of it is inlined into kernels ([`registers::run`](super::registers::run)), which are compiled once for each width.
 
+// Arrays of lanes are walked side by side.
+#![allow(clippy::needless_range_loop)]
+
 use super::Param;
 use super::axes::RootAxes;
 pub(crate) use super::registers::{Bits, Kernel, LANES, Lanes, Pack, fetch, run};

@@ -15,6 +15,8 @@ pub mod perlin;
 pub mod refine;
 pub mod region;
 mod registers;
+#[cfg(test)]
+mod registers_tests;
 pub mod vary;
 pub mod wave;
 pub mod wind;

@@ -80,8 +80,8 @@ impl Kernel for Chunk<'_> {
                 let [x, y, z] = group.vectors::<L>(n.root).0;
                 root = V([x / across, y / across, z / across]);
             } else {
-                for l in 0..LANES {
-                    own[l] = key(n.seed, n.id[group.hair(l)], n.channel);
+                for (l, own) in own.iter_mut().enumerate() {
+                    *own = key(n.seed, n.id[group.hair(l)], n.channel);
                 }
             }
             let own = L::Bits::load(&own);
