@@ -6,7 +6,7 @@
 //! every frame the axes turn no more than the hair does, and a hair that moves as a whole takes them along.
 
 use super::V3;
-use super::lanes::{Block, F, LANES, V, below};
+use super::lanes::{Block, Lanes, Pack, Pack3, V};
 use pelage_geom::{Mesh, Pose, SurfacePoint, Topology, Vec3};
 use rayon::prelude::*;
 
@@ -69,81 +69,95 @@ pub fn carried(
 }
 
 /// Axes at the points of hairs side by side, used again from block to block.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Beside {
     /// Unit tangents.
-    pub tangent: Vec<V>,
+    tangent: Vec<Pack3>,
     /// x axes.
-    pub normal: Vec<V>,
+    pub normal: Vec<Pack3>,
     /// y axes.
-    pub binormal: Vec<V>,
+    pub binormal: Vec<Pack3>,
     /// Length of the hairs up to each point.
-    pub arc: Vec<F>,
+    pub arc: Vec<Pack>,
 }
 
 impl Beside {
-    /// Sets arc lengths only.
-    pub fn set_arc(&mut self, hairs: &Block) {
-        self.arc.clear();
-        let mut arc = F::splat(0.0);
-        self.arc.push(arc);
-        for w in hairs.point.windows(2) {
-            let d = w[1] - w[0];
-            arc += d.dot(d).sqrt();
-            self.arc.push(arc);
-        }
+    /// Room for hairs of `points` points.
+    pub fn new(points: usize) -> Self {
+        let room = || vec![Pack3::default(); points];
+        Beside { tangent: room(), normal: room(), binormal: room(), arc: vec![Pack::default(); points] }
     }
 
-    /// Sets tangents, axes and arc lengths: what [`Along::set`] does, lane by lane. `root` has the axes of the lanes' roots.
-    pub fn set(&mut self, hairs: &Block, root: [&RootAxes; LANES]) {
-        let (zero, one) = (F::splat(0.0), F::splat(1.0));
-        self.arc.clear();
-        self.tangent.clear();
-        self.normal.clear();
-        self.binormal.clear();
-        self.arc.push(zero);
-        // Two loops: one of them waits for divisions, the other for the axis before.
-        let first = V::gather(|l| root[l].tangent);
-        let (mut before, mut arc) = (first, zero);
-        for (k, w) in hairs.point.windows(2).enumerate() {
-            let d = w[1] - w[0];
-            let n = d.dot(d).sqrt();
-            arc += n;
-            self.arc.push(arc);
-            let t = d.times(one / n).or(below(zero, n), before);
-            // A point's tangent halves the angle between its segments.
-            let sum = before + t;
-            let n2 = sum.dot(sum);
-            let middle = sum.times(one / n2.sqrt()).or(below(F::splat(1e-8), n2), t);
-            self.tangent.push(if k == 0 { t } else { middle });
-            before = t;
+    /// Sets arc lengths only; gives back the whole length.
+    #[inline(always)]
+    pub fn set_arc<L: Lanes>(&mut self, hairs: &Block) -> L {
+        let mut before = V::<L>::load(&hairs.point[0]);
+        let mut arc = L::splat(0.0);
+        for (p, to) in hairs.point.iter().zip(&mut self.arc) {
+            // The root is no way from itself.
+            let here = V::load(p);
+            let d = here - before;
+            arc = arc + d.dot(d).sqrt();
+            arc.store(to);
+            before = here;
         }
-        self.tangent.push(before);
-        let (mut t0, mut x) = (first, V::gather(|l| root[l].normal));
-        for &t in &self.tangent {
+        arc
+    }
+
+    /// Sets tangents, axes and arc lengths: what [`Along::set`] does, lane by lane. `root` has the tangents and x axes of
+    /// the lanes' roots. Gives back the whole length.
+    #[inline(always)]
+    pub fn set<L: Lanes>(&mut self, hairs: &Block, root: [V<L>; 2]) -> L {
+        let (zero, one, short) = (L::splat(0.0), L::splat(1.0), L::splat(1e-8));
+        let points = hairs.point.len();
+        let (tangent, arcs) = (&mut self.tangent[..points], &mut self.arc[..points]);
+        // Two loops: one of them waits for divisions, the other for the axis before.
+        let (mut t_before, mut arc, mut before) = (root[0], zero, V::<L>::load(&hairs.point[0]));
+        arc.store(&mut arcs[0]);
+        for k in 1..points {
+            let here = V::load(&hairs.point[k]);
+            let d = here - before;
+            before = here;
+            let n = d.dot(d).sqrt();
+            arc = arc + n;
+            arc.store(&mut arcs[k]);
+            let t = V::if_gt(n, zero, d.times(one / n), t_before);
+            // A point's tangent halves the angle between its segments.
+            let sum = t_before + t;
+            let n2 = sum.dot(sum);
+            let middle = V::if_gt(n2, short, sum.times(one / n2.sqrt()), t);
+            (if k == 1 { t } else { middle }).store(&mut tangent[k - 1]);
+            t_before = t;
+        }
+        t_before.store(&mut tangent[points - 1]);
+        let (normal, binormal) = (&mut self.normal[..points], &mut self.binormal[..points]);
+        let [mut t0, mut x] = root;
+        for k in 0..points {
+            let t = V::load(&tangent[k]);
             x = turned_lanes(x, t0, t);
             t0 = t;
-            self.normal.push(x);
-            self.binormal.push(t.cross(x));
+            x.store(&mut normal[k]);
+            t.cross(x).store(&mut binormal[k]);
         }
+        arc
     }
 }
 
 /// [`turned`] in lanes.
 #[inline(always)]
-fn turned_lanes(x: V, from: V, to: V) -> V {
+fn turned_lanes<L: Lanes>(x: V<L>, from: V<L>, to: V<L>) -> V<L> {
     let cosine = from.dot(to);
-    let y = x - (from + to).times(x.dot(to) / (F::splat(1.0) + cosine));
+    let y = x - (from + to).times(x.dot(to) / (L::splat(1.0) + cosine));
     let y = y - to.times(y.dot(to));
-    let y = y.times(F::splat(1.5) - F::splat(0.5) * y.dot(y));
-    let folded = below(cosine, F::splat(FOLDED));
-    if !folded.any() {
+    let y = y.times(L::splat(1.5) - L::splat(0.5) * y.dot(y));
+    let folded = L::splat(FOLDED);
+    if !L::any_gt(folded, cosine) {
         return y;
     }
     let across = x - to.times(x.dot(to));
     let n = across.dot(across).sqrt();
-    let other = across.times(F::splat(1.0) / n).or(below(F::splat(1e-3), n), x);
-    other.or(folded, y)
+    let other = V::if_gt(n, L::splat(1e-3), across.times(L::splat(1.0) / n), x);
+    V::if_gt(folded, cosine, other, y)
 }
 
 /// Axes at the points of one hair, used again from hair to hair: the plain form of [`Beside`].
@@ -210,6 +224,7 @@ pub(crate) fn turned(x: V3, from: V3, to: V3) -> V3 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::lanes::{Group, Kernel, LANES, run};
     use super::*;
     use nalgebra::{Rotation3, Unit};
 
@@ -261,22 +276,33 @@ mod tests {
 
     #[test]
     fn hairs_side_by_side_have_the_axes_of_each() {
-        let mut all: Vec<[f32; 3]> = (0..7).flat_map(|s| hair(s, 30)).collect();
+        struct Set<'a>(&'a mut Beside, &'a [[f32; 3]], &'a [RootAxes], &'a Group);
+        impl Kernel for Set<'_> {
+            type Out = ();
+            #[inline(always)]
+            fn run<L: Lanes>(self) {
+                let mut block = Block::new(30);
+                block.load::<L>(self.1, self.3);
+                self.0.set::<L>(&block, self.3.roots(self.2));
+            }
+        }
+        let last = LANES as u64 - 1;
+        let mut all: Vec<[f32; 3]> = (0..last).flat_map(|s| hair(s, 30)).collect();
         // One hair folds back on itself and stands still in between.
         all.extend((0..30).map(|k| [[0.0, 1.0, 1.0, 0.0][k % 4], 0.0, 0.0]));
-        let roots: Vec<RootAxes> = all.chunks_exact(30).map(root).collect();
-        let mut block = Block::default();
-        block.load(30, &all);
-        let mut beside = Beside::default();
-        beside.set(&block, std::array::from_fn(|l| &roots[l]));
+        let axes: Vec<RootAxes> = all.chunks_exact(30).map(root).collect();
+        let lane: [usize; LANES] = std::array::from_fn(|l| l);
+        let group = Group::new(0, &lane);
+        let mut beside = Beside::new(30);
+        run(Set(&mut beside, &all, &axes, &group));
         for l in 0..LANES {
             let mut one = Along::default();
-            one.set(&all[l * 30..][..30], &roots[l]);
-            let lane = |v: &V| V3::new(v.0[0].to_array()[l], v.0[1].to_array()[l], v.0[2].to_array()[l]);
+            one.set(&all[l * 30..][..30], &axes[l]);
+            let of = |v: &Pack3| V3::new(v[0].0[l], v[1].0[l], v[2].0[l]);
             for k in 0..30 {
-                assert!((lane(&beside.tangent[k]) - one.tangent[k]).norm() < 1e-5, "{l} {k}");
-                assert!((lane(&beside.normal[k]) - one.normal[k]).norm() < 1e-4, "{l} {k}");
-                assert!((beside.arc[k].to_array()[l] - one.arc[k]).abs() < 1e-4);
+                assert!((of(&beside.tangent[k]) - one.tangent[k]).norm() < 1e-5, "{l} {k}");
+                assert!((of(&beside.normal[k]) - one.normal[k]).norm() < 1e-4, "{l} {k}");
+                assert!((beside.arc[k].0[l] - one.arc[k]).abs() < 1e-4);
             }
         }
     }

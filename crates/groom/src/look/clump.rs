@@ -7,7 +7,8 @@
 //! (and stays the straight line at rate 0). `delta` stays within 0 and 1, grows along the hair at every rate, and is
 //! smooth.
 
-use super::axes::{Along, RootAxes};
+use super::axes::{self, RootAxes};
+use super::lanes::{Kernel, LANES, Lanes, fetch, run};
 use super::{CHUNK, Param, V3, at_station, lengths, relay, station_weights};
 use pelage_geom::rng::{channel, uniform};
 use pelage_geom::{NONE, StrandId};
@@ -80,11 +81,110 @@ fn splayed(points: usize) -> Vec<f32> {
 /// Draws hairs of `points` points toward the lines of their clumps ([`centre_lines`]). A hair with percent 0, without a
 /// clump, or a centre itself keeps its bytes; percent 1 at rate 0 brings a tip onto the centre's exactly.
 pub fn clump(points: usize, c: &Clump, line: &[[f32; 3]], position: &mut [[f32; 3]]) {
-    let (profile, splay) = (profile(points, c.taper), splayed(points));
-    let stations = station_weights(5, points);
-    position.par_chunks_mut(CHUNK * points).enumerate().for_each(|(chunk, out)| {
-        let (mut delta, mut length) = (vec![0.0f32; points], Vec::new());
-        for (h, hair) in (chunk * CHUNK..).zip(out.chunks_exact_mut(points)) {
+    let each = |v: Vec<f32>| -> Vec<f32> { v.iter().flat_map(|x| [*x; 3]).collect() };
+    let profile = profile(points, c.taper);
+    let straight = each(profile.iter().map(|p| p[0]).collect());
+    let bent = each(profile.iter().map(|p| p[1]).collect());
+    let (splay, stations) = (each(splayed(points)), station_weights(5, points));
+    position.par_chunks_mut(CHUNK * points).enumerate().for_each(|(chunk, hairs)| {
+        let first = chunk * CHUNK;
+        let along = Along { straight: &straight, bent: &bent, splay: &splay };
+        run(Chunk { clump: c, line, along, stations: &stations, points, first, hairs });
+    });
+}
+
+/// Hairs before its turn that the line of a hair's clump is asked for. Below about 4 it comes too late; above some
+/// hundred it may be gone again.
+const AHEAD: usize = 12;
+
+/// What acts at the points of every hair, for each of a point's three coordinates.
+#[derive(Clone, Copy)]
+struct Along<'a> {
+    /// `delta` at rate 0.
+    straight: &'a [f32],
+    /// What rate 1 adds.
+    bent: &'a [f32],
+    splay: &'a [f32],
+}
+
+/// How one hair is drawn.
+#[derive(Clone, Copy)]
+struct Draw<'a> {
+    percent: f32,
+    rate: f32,
+    open: f32,
+    line: &'a [f32],
+    along: Along<'a>,
+}
+
+impl Draw<'_> {
+    /// Draws a hair toward the line, as many of its numbers at a time as there are lanes; its root stays.
+    #[inline(always)]
+    fn run<L: Lanes>(&self, hair: &mut [f32]) {
+        let n = hair.len();
+        if n < 3 + LANES {
+            let a = &self.along;
+            for (k, x) in hair.iter_mut().enumerate().skip(3) {
+                let d = self.percent * (a.straight[k] + self.rate * a.bent[k]) * (1.0 - self.open * a.splay[k]);
+                *x = *x * (1.0 - d) + self.line[k] * d;
+            }
+            return;
+        }
+        // The last numbers are read before those that they overlap with are written.
+        let last = self.drawn::<L>(hair, n - LANES);
+        for first in (3..n - LANES).step_by(LANES) {
+            self.drawn::<L>(hair, first).write(hair[first..].first_chunk_mut().expect(WITHIN));
+        }
+        last.write(hair[n - LANES..].first_chunk_mut().expect(WITHIN));
+    }
+
+    /// Numbers of the hair from `first` on.
+    #[inline(always)]
+    fn drawn<L: Lanes>(&self, hair: &[f32], first: usize) -> L {
+        let one = L::splat(1.0);
+        let [straight, bent] = [at::<L>(self.along.straight, first), at(self.along.bent, first)];
+        let splay = one - L::splat(self.open) * at(self.along.splay, first);
+        let d = L::splat(self.percent) * (straight + L::splat(self.rate) * bent) * splay;
+        // This form meets the centre at 1 without rounding.
+        at::<L>(hair, first) * (one - d) + at::<L>(self.line, first) * d
+    }
+}
+
+const WITHIN: &str = "as many numbers as lanes lie within the hair";
+
+/// Numbers from `first` on.
+#[inline(always)]
+fn at<L: Lanes>(of: &[f32], first: usize) -> L {
+    L::read(of[first..].first_chunk().expect(WITHIN))
+}
+
+/// Hairs that one task handles.
+struct Chunk<'a> {
+    clump: &'a Clump<'a>,
+    /// Lines of the clumps.
+    line: &'a [[f32; 3]],
+    along: Along<'a>,
+    /// Weights of the stations at each point.
+    stations: &'a [Vec<f32>],
+    points: usize,
+    /// The first hair's index.
+    first: usize,
+    hairs: &'a mut [[f32; 3]],
+}
+
+impl Kernel for Chunk<'_> {
+    type Out = ();
+    // One hair after another: its numbers lie side by side already.
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let (c, points, along) = (self.clump, self.points, self.along);
+        let (mut size_along, mut length) = (vec![0.0f32; 3 * points], Vec::new());
+        let mut held = [vec![0.0f32; 3 * points], vec![0.0f32; 3 * points]];
+        for (h, hair) in (self.first..).zip(self.hairs.chunks_exact_mut(points)) {
+            // Lines lie anywhere in memory: without this, hairs of few points wait for them.
+            if let Some(&own) = c.clump.get(h + AHEAD).filter(|own| **own != NONE) {
+                fetch(self.line[own as usize * points..][..points].as_flattened());
+            }
             let own = c.clump[h];
             if own == NONE || c.centre[own as usize] as usize == h {
                 continue;
@@ -96,23 +196,25 @@ pub fn clump(points: usize, c: &Clump, line: &[[f32; 3]], position: &mut [[f32; 
             if c.keep_length {
                 lengths(hair, &mut length);
             }
+            let mut open = c.splay.of(h).clamp(0.0, 1.0);
+            if open != 0.0 {
+                open *= uniform(c.seed, c.id[h], channel("clump splay"), 0) as f32;
+            }
+            let line = &self.line[own as usize * points..][..points];
+            let mut draw = Draw { percent, rate: c.rate.of(h).clamp(0.0, 1.0), open, line: line.as_flattened(), along };
             if let Some(d) = c.dilation.get(own as usize) {
                 let size = [1.0, d[0], d[1], d[2], d[3]];
-                delta.iter_mut().zip(&stations).for_each(|(x, w)| *x = percent * (1.0 - at_station(w, &size)));
-            } else {
-                let rate = c.rate.of(h).clamp(0.0, 1.0);
-                delta.iter_mut().zip(&profile).for_each(|(x, [a, b])| *x = percent * (a + rate * b));
+                for (x, w) in size_along.chunks_exact_mut(3).zip(self.stations) {
+                    x.fill(1.0 - at_station(w, &size));
+                }
+                draw = Draw { rate: 0.0, along: Along { straight: &size_along, ..along }, ..draw };
             }
-            let open = c.splay.of(h).clamp(0.0, 1.0);
-            if open != 0.0 {
-                let open = open * uniform(c.seed, c.id[h], channel("clump splay"), 0) as f32;
-                delta.iter_mut().zip(&splay).for_each(|(x, s)| *x *= 1.0 - open * s);
-            }
-            let line = &line[own as usize * points..][..points];
             if c.hold < f32::INFINITY {
-                hold(hair, line, c.hold, &mut delta);
+                let [straight, bent] = &mut held;
+                hold(hair, line, c.hold, &draw.along, straight, bent);
+                draw.along = Along { straight, bent, ..draw.along };
             }
-            draw(hair, line, &delta);
+            draw.run::<L>(hair.as_flattened_mut());
             let weave = c.weave.of(h);
             if weave != 0.0 {
                 let turns = percent * weave * (2.0 * uniform(c.seed, c.id[h], channel("clump weave"), 0) - 1.0) as f32;
@@ -122,24 +224,17 @@ pub fn clump(points: usize, c: &Clump, line: &[[f32; 3]], position: &mut [[f32; 
                 relay(hair, &length);
             }
         }
-    });
-}
-
-#[inline(always)]
-fn draw(hair: &mut [[f32; 3]], line: &[[f32; 3]], delta: &[f32]) {
-    for ((p, q), &d) in hair.iter_mut().zip(line).zip(delta).skip(1) {
-        // This form meets the centre at 1 without rounding.
-        *p = std::array::from_fn(|x| p[x] * (1.0 - d) + q[x] * d);
     }
 }
 
-/// Lessens `delta` where a hair is farther from its line than `reach`, and from there on.
-fn hold(hair: &[[f32; 3]], line: &[[f32; 3]], reach: f32, delta: &mut [f32]) {
+/// What acts along a hair, less where it is farther from its line than `reach`, and from there on.
+fn hold(hair: &[[f32; 3]], line: &[[f32; 3]], reach: f32, along: &Along, straight: &mut [f32], bent: &mut [f32]) {
     let mut held = 1.0f32;
-    for ((p, q), delta) in hair.iter().zip(line).zip(delta) {
+    for (k, (p, q)) in hair.iter().zip(line).enumerate() {
         let beyond = ((V3::from(*p) - V3::from(*q)).norm() / reach - 1.0).clamp(0.0, 1.0);
         held = held.min(1.0 - beyond * beyond * (3.0 - 2.0 * beyond));
-        *delta *= held;
+        straight[3 * k..3 * k + 3].fill(held * along.straight[3 * k]);
+        bent[3 * k..3 * k + 3].fill(held * along.bent[3 * k]);
     }
 }
 
@@ -194,7 +289,7 @@ fn in_carriers(
     line: &[[f32; 3]],
     point: impl Fn(V3, [V3; 3], [f32; 3]) -> V3,
 ) -> Vec<[f32; 3]> {
-    let mut along = Along::default();
+    let mut along = axes::Along::default();
     let mut out = Vec::with_capacity(line.len());
     for (&h, line) in carrier.iter().zip(line.chunks_exact(points)) {
         let hair = &position[h as usize * points..][..points];

@@ -14,6 +14,9 @@ pub mod noise;
 pub mod perlin;
 pub mod refine;
 pub mod region;
+mod registers;
+#[cfg(test)]
+mod registers_tests;
 pub mod vary;
 pub mod wave;
 pub mod wind;
@@ -44,11 +47,6 @@ impl Param<'_> {
     pub fn of(&self, h: usize) -> f32 {
         self.value * self.factor.get(h).unwrap_or(&1.0) + self.shift.get(h).unwrap_or(&0.0)
     }
-}
-
-/// Hairs of the lanes of a block that starts at hair `first` and has `count`; lanes without a hair repeat the last.
-pub(crate) fn lanes(first: usize, count: usize) -> [usize; lanes::LANES] {
-    std::array::from_fn(|l| first + l.min(count - 1))
 }
 
 /// Lays a hair out again from its root: the directions of `hair`, the segment lengths `length`. A segment without a

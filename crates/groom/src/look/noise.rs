@@ -1,9 +1,9 @@
 //! Noise and frizz: random offsets across the hair, smooth along it.
 
 use super::axes::{Beside, RootAxes};
-use super::lanes::{Block, F, LANES, U, V, perlin1, perlin3};
+use super::lanes::{Bits, Block, Group, Kernel, LANES, Lanes, V, perlin1, perlin3, run};
 use super::perlin::key;
-use super::{CHUNK, Param, lanes};
+use super::{CHUNK, Param};
 use crate::along::at_points;
 use pelage_geom::StrandId;
 use rayon::prelude::*;
@@ -42,41 +42,67 @@ pub struct Noise<'a> {
 /// Adds noise to hairs of `points` points. Roots stay; a hair of amplitude 0 keeps its bytes.
 pub fn noise(points: usize, n: &Noise, position: &mut [[f32; 3]]) {
     let profile = at_points(n.profile, points);
-    let of_all = key(n.seed, 0, n.channel);
-    let per_unit = 1.0 / n.size;
-    let way = V([F::splat(WAY[0]), F::splat(WAY[1]), F::splat(WAY[2])]);
-    let (one, three) = (F::splat(1.0), F::splat(3.0));
-    position.par_chunks_mut(CHUNK * points).enumerate().for_each(|(chunk, out)| {
-        let (mut along, mut block) = (Beside::default(), Block::default());
-        for (b, hairs) in out.chunks_mut(LANES * points).enumerate() {
-            let lane = lanes(chunk * CHUNK + b * LANES, hairs.len() / points);
-            let amplitude = lane.map(|h| n.amplitude.of(h));
-            if amplitude == [0.0; LANES] {
-                continue;
+    position.par_chunks_mut(CHUNK * points).enumerate().for_each(|(chunk, hairs)| {
+        run(Chunk { noise: n, profile: &profile, points, first: chunk * CHUNK, hairs });
+    });
+}
+
+/// Hairs that one task handles.
+struct Chunk<'a> {
+    noise: &'a Noise<'a>,
+    profile: &'a [f32],
+    points: usize,
+    /// The first hair's index.
+    first: usize,
+    hairs: &'a mut [[f32; 3]],
+}
+
+impl Kernel for Chunk<'_> {
+    type Out = ();
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let (n, points) = (self.noise, self.points);
+        let of_all = key(n.seed, 0, n.channel);
+        let (per_unit, way) = (L::splat(1.0 / n.size), V::splat(WAY));
+        let (one, three, half) = (L::splat(1.0), L::splat(3.0), L::splat(0.5));
+        let scale = L::splat(1.0 / RMS1);
+        let (mut along, mut block) = (Beside::new(points), Block::new(points));
+        let moves = |h: &usize| n.amplitude.of(self.first + h) != 0.0;
+        let todo: Vec<usize> = (0..self.hairs.len() / points).filter(moves).collect();
+        for hairs in todo.chunks(LANES) {
+            let group = Group::new(self.first, hairs);
+            block.load::<L>(self.hairs, &group);
+            along.set::<L>(&block, group.roots(n.axes));
+            let amplitude: L = group.param(&n.amplitude);
+            let (mut own, mut root) = ([0; LANES], V::splat([0.0; 3]));
+            if n.across > 0.0 {
+                let across = L::splat(n.across);
+                let [x, y, z] = group.vectors::<L>(n.root).0;
+                root = V([x / across, y / across, z / across]);
+            } else {
+                for (l, own) in own.iter_mut().enumerate() {
+                    *own = key(n.seed, n.id[group.hair(l)], n.channel);
+                }
             }
-            block.load(points, hairs);
-            along.set(&block, lane.map(|h| &n.axes[h]));
-            let own = U::from(lane.map(|h| key(n.seed, n.id[h], n.channel)));
-            let root = V::gather(|l| n.root[lane[l]].map(|x| x / n.across));
-            let amplitude_of = F::from(amplitude);
+            let own = L::Bits::load(&own);
             for k in 1..points {
-                let t = along.arc[k] * F::splat(per_unit);
-                let f = t.fast_min(one);
-                let size = amplitude_of * f * f * (three - f - f) * F::splat(*profile.get(k).unwrap_or(&1.0));
+                let t = L::load(&along.arc[k]) * per_unit;
+                let f = t.min(one);
+                let size = amplitude * f * f * (three - f - f) * L::splat(*self.profile.get(k).unwrap_or(&1.0));
                 let [x, y] = if n.across > 0.0 {
                     perlin3(of_all, root + way.times(t))
                 } else {
                     // Half a cell apart, so that they are not both 0 at the same places.
-                    let (x, y) = (perlin1(own, t), perlin1(!own, t + F::splat(0.5)));
-                    [x * F::splat(1.0 / RMS1), y * F::splat(1.0 / RMS1)]
+                    let (x, y) = (perlin1(own, t), perlin1(own ^ L::Bits::splat(u32::MAX), t + half));
+                    [x * scale, y * scale]
                 };
-                let offset = along.normal[k].times(size * x) + along.binormal[k].times(size * y);
-                block.point[k] = block.point[k] + offset;
+                let offset = V::load(&along.normal[k]).times(size * x) + V::load(&along.binormal[k]).times(size * y);
+                (V::load(&block.point[k]) + offset).store(&mut block.point[k]);
             }
             if n.keep_length {
-                block.relay(&along.arc);
+                block.relay::<L>(&along.arc);
             }
-            block.store(points, amplitude.map(|a| a != 0.0), hairs);
+            block.store::<L>(&group, self.hairs);
         }
-    });
+    }
 }

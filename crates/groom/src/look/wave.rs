@@ -7,10 +7,10 @@
 //! `mean + deviation random(scale r)` with Perlin's noise for `random` (13 to 15), so random(0) = 0.
 
 use super::axes::{Beside, RootAxes};
-use super::lanes::{Block, F, LANES, U, gather, perlin1 as lanes_perlin1, sin_cos_turn};
+use super::lanes::{Bits, Block, Group, Kernel, LANES, Lanes, Pack, V, perlin1 as lanes_perlin1, run, sin_cos_turn};
 use super::perlin::{key, perlin1, perlin3};
 use super::vary::Drawn;
-use super::{CHUNK, Param, lanes, station_weights};
+use super::{CHUNK, Param, station_weights};
 use pelage_geom::TiledMap;
 use pelage_geom::rng::{channel, uniform};
 use rayon::prelude::*;
@@ -111,33 +111,53 @@ pub fn wave(points: usize, w: &Waves, position: &mut [[f32; 3]]) {
     let stations = station_weights(5, points);
     let name = |what: &str, axis: usize| key(w.seed ^ channel(what), axis as u64, w.channel);
     let names: [[u32; 3]; 2] = std::array::from_fn(|a| [name("amplitude", a), name("frequency", a), name("phase", a)]);
-    position.par_chunks_mut(CHUNK * points).enumerate().for_each(|(chunk, out)| {
-        let (mut along, mut block) = (Beside::default(), Block::default());
-        for (b, hairs) in out.chunks_mut(LANES * points).enumerate() {
-            let lane = lanes(chunk * CHUNK + b * LANES, hairs.len() / points);
-            let own: [[Own; LANES]; 2] =
-                std::array::from_fn(|a| lane.map(|h| Own::new(&w.axis[a], names[a], w.r[h], w.strength.of(h))));
-            let still = |l: usize| own[0][l].amplitude == [0.0; 5] && own[1][l].amplitude == [0.0; 5];
-            let active: [bool; LANES] = std::array::from_fn(|l| !still(l));
-            if active == [false; LANES] {
-                continue;
-            }
-            let own = own.map(OwnLanes::new);
-            block.load(points, hairs);
-            along.set(&block, lane.map(|h| &w.axes[h]));
-            let total = along.arc[points - 1].fast_max(F::splat(f32::MIN_POSITIVE));
-            for (k, stations) in stations.iter().enumerate().skip(1) {
-                let l = along.arc[k] / total;
-                let x = own[0].at(w.shape, names[0][2], stations, l);
-                let y = own[1].at(w.shape, names[1][2], stations, l);
-                block.point[k] = block.point[k] + along.normal[k].times(x) + along.binormal[k].times(y);
+    position.par_chunks_mut(CHUNK * points).enumerate().for_each(|(chunk, hairs)| {
+        let first = chunk * CHUNK;
+        let own_of = |h: usize, a: usize| Own::new(&w.axis[a], names[a], w.r[h], w.strength.of(h));
+        let own: Vec<[Own; 2]> = (first..first + hairs.len() / points).map(|h| [own_of(h, 0), own_of(h, 1)]).collect();
+        run(Chunk { waves: w, own: &own, phase: [names[0][2], names[1][2]], stations: &stations, first, hairs });
+    });
+}
+
+/// Hairs that one task handles.
+struct Chunk<'a> {
+    waves: &'a Waves<'a>,
+    own: &'a [[Own; 2]],
+    /// Names of the phases.
+    phase: [u32; 2],
+    /// Weights of the stations at each point.
+    stations: &'a [Vec<f32>],
+    /// The first hair's index.
+    first: usize,
+    hairs: &'a mut [[f32; 3]],
+}
+
+impl Kernel for Chunk<'_> {
+    type Out = ();
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let (w, points) = (self.waves, self.stations.len());
+        let (mut along, mut block) = (Beside::new(points), Block::new(points));
+        let moves = |h: &usize| self.own[*h][0].amplitude != [0.0; 5] || self.own[*h][1].amplitude != [0.0; 5];
+        let todo: Vec<usize> = (0..self.own.len()).filter(moves).collect();
+        for hairs in todo.chunks(LANES) {
+            let group = Group::new(self.first, hairs);
+            let x = OwnLanes::<L>::new(self.own, 0, &group);
+            let y = OwnLanes::<L>::new(self.own, 1, &group);
+            block.load::<L>(self.hairs, &group);
+            let total = along.set::<L>(&block, group.roots(w.axes)).max(L::splat(f32::MIN_POSITIVE));
+            for (k, stations) in self.stations.iter().enumerate().skip(1) {
+                let l = L::load(&along.arc[k]) / total;
+                let x = V::load(&along.normal[k]).times(x.at(w.shape, self.phase[0], stations, l));
+                let y = V::load(&along.binormal[k]).times(y.at(w.shape, self.phase[1], stations, l));
+                (V::load(&block.point[k]) + x + y).store(&mut block.point[k]);
             }
             if w.keep_length {
-                block.relay(&along.arc);
+                block.relay::<L>(&along.arc);
             }
-            block.store(points, active, hairs);
+            block.store::<L>(&group, self.hairs);
         }
-    });
+    }
 }
 
 /// The wave of one hair along one axis, at five stations.
@@ -161,35 +181,50 @@ impl Own {
 }
 
 /// [`Own`] in lanes.
-struct OwnLanes {
-    amplitude: [F; 5],
-    frequency: [F; 5],
-    phase: F,
+struct OwnLanes<L> {
+    amplitude: [L; 5],
+    frequency: [L; 5],
+    phase: L,
 }
 
-impl OwnLanes {
-    fn new(own: [Own; LANES]) -> Self {
-        OwnLanes {
-            amplitude: std::array::from_fn(|s| gather(|l| own[l].amplitude[s])),
-            frequency: std::array::from_fn(|s| gather(|l| own[l].frequency[s])),
-            phase: gather(|l| own[l].phase),
+impl<L: Lanes> OwnLanes<L> {
+    #[inline(always)]
+    fn new(own: &[[Own; 2]], axis: usize, group: &Group) -> Self {
+        let (mut amplitude, mut frequency, mut phase) = ([Pack::default(); 5], [Pack::default(); 5], Pack::default());
+        for l in 0..LANES {
+            let own = &own[group.lane[l]][axis];
+            for s in 0..5 {
+                amplitude[s].0[l] = own.amplitude[s];
+                frequency[s].0[l] = own.frequency[s];
+            }
+            phase.0[l] = own.phase;
         }
+        let zero = L::splat(0.0);
+        let mut out = OwnLanes { amplitude: [zero; 5], frequency: [zero; 5], phase: L::load(&phase) };
+        for s in 0..5 {
+            out.amplitude[s] = L::load(&amplitude[s]);
+            out.frequency[s] = L::load(&frequency[s]);
+        }
+        out
     }
 
     #[inline(always)]
-    fn at(&self, shape: Shape, key: u32, stations: &[f32], l: F) -> F {
-        let sum = |v: &[F; 5]| {
-            let mut sum = F::splat(0.0);
-            for (v, w) in v.iter().zip(stations) {
-                sum += *v * F::splat(*w);
-            }
-            sum
-        };
-        let turns = self.phase + sum(&self.frequency) * l;
+    fn at(&self, shape: Shape, key: u32, stations: &[f32], l: L) -> L {
+        let turns = self.phase + sum(&self.frequency, stations) * l;
         let wave = match shape {
             Shape::Sine => sin_cos_turn(turns).0,
-            Shape::Noise => lanes_perlin1(U::splat(key ^ 0x5bd1_e995), turns),
+            Shape::Noise => lanes_perlin1(L::Bits::splat(key ^ 0x5bd1_e995), turns),
         };
-        sum(&self.amplitude) * wave
+        sum(&self.amplitude, stations) * wave
     }
+}
+
+/// Sum of stations' values by weights.
+#[inline(always)]
+fn sum<L: Lanes>(values: &[L; 5], weights: &[f32]) -> L {
+    let mut sum = L::splat(0.0);
+    for (v, w) in values.iter().zip(weights) {
+        sum = sum + *v * L::splat(*w);
+    }
+    sum
 }
