@@ -101,6 +101,7 @@ fn write_rate(path: &Path, bytes: usize, run: impl FnOnce()) -> f64 {
 
 fn shot(curves: usize, points: usize, frames: usize) -> (ShotFacts, HairLayer) {
     let facts = ShotFacts {
+        lights: vec![],
         name: "bench".into(),
         meters_per_unit: 0.01,
         up: 'Y',
