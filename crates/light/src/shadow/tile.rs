@@ -20,6 +20,24 @@ const EVEN: f32 = 0.25;
 /// overlap.
 const AHEAD: usize = 64;
 
+/// Times that a segment is halved until it is straight in slices.
+const SPLITS: u32 = 5;
+
+/// Slices that the middle of a segment may be off by: more puts hair before its neighbour that lies behind it.
+const STRAIGHT: f32 = 0.25;
+
+/// Hands out a segment in pieces whose depths, put into slices by `at` at their ends, are right between them too.
+fn straighten(s: Segment, at: &impl Fn(f32) -> f32, splits: u32, emit: &mut impl FnMut(Segment)) {
+    let middle: [f32; 3] = std::array::from_fn(|i| 0.5 * (s.a[i] + s.b[i]));
+    let (a, b) = (at(s.a[2]), at(s.b[2]));
+    if splits > 0 && (at(middle[2]) - 0.5 * (a + b)).abs() > STRAIGHT {
+        straighten(Segment { b: middle, ..s }, at, splits - 1, emit);
+        straighten(Segment { a: middle, ..s }, at, splits - 1, emit);
+    } else {
+        emit(Segment { a: [s.a[0], s.a[1], a], b: [s.b[0], s.b[1], b], ..s });
+    }
+}
+
 /// What one thread needs for its tiles.
 pub(crate) struct Work<'a> {
     projection: &'a Projection,
@@ -29,6 +47,8 @@ pub(crate) struct Work<'a> {
     hidden: usize,
     volume: Volume,
     segment: Vec<Cast>,
+    /// Segments before they were cut where slices change their distances.
+    bent: Vec<Cast>,
     receiver: Vec<Receiver>,
     line: Vec<Line>,
     warp: Vec<f32>,
@@ -59,6 +79,7 @@ impl<'a> Work<'a> {
             hidden: 0,
             volume: Volume::new(projection.filter, settings.slices),
             segment: Vec::new(),
+            bent: Vec::new(),
             receiver: Vec::new(),
             line: Vec::new(),
             warp: Vec::new(),
@@ -195,10 +216,11 @@ impl<'a> Work<'a> {
                 warp[i] + (warp[i + 1] - warp[i]) * (b - i as f32)
             }
         };
-        for Cast { segment: s, .. } in &mut self.segment {
-            s.a[2] = at(s.a[2]);
-            s.b[2] = at(s.b[2]);
+        self.bent.clear();
+        for Cast { segment, strand } in &self.segment {
+            straighten(*segment, &at, SPLITS, &mut |segment| self.bent.push(Cast { segment, strand: *strand }));
         }
+        std::mem::swap(&mut self.segment, &mut self.bent);
         for r in &mut self.receiver {
             r.at[2] = at(r.at[2]);
         }

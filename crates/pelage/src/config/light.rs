@@ -92,7 +92,7 @@ pub enum ShadowQuality {
     /// Where the measured curve of error against time bends.
     #[default]
     Default,
-    /// A quarter of the default's texels, for close-ups.
+    /// Twice the default's texels each way, for close-ups.
     Fine,
     /// By rays against every hair: exact, and hundreds of times slower.
     Reference,
