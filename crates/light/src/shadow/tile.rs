@@ -5,7 +5,7 @@ use super::line::Line;
 use super::project::Projection;
 use super::settings::{Placement, ShadowSettings};
 use super::solid::{self, Solid};
-use super::volume::{Own, Volume, Window};
+use super::volume::{Taps, Volume, Window};
 use super::{ShadowHair, TILE};
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -32,7 +32,7 @@ pub(crate) struct Work<'a> {
     receiver: Vec<Receiver>,
     line: Vec<Line>,
     warp: Vec<f32>,
-    own: Own,
+    taps: Taps,
     window: Window,
 }
 
@@ -62,7 +62,7 @@ impl<'a> Work<'a> {
             receiver: Vec::new(),
             line: Vec::new(),
             warp: Vec::new(),
-            own: Own::new(),
+            taps: Taps::new(),
             window: Window::new(),
         }
     }
@@ -214,12 +214,8 @@ impl<'a> Work<'a> {
         for r in &self.receiver[receivers] {
             let window = &mut self.window;
             window.put(r.at[0], r.at[1], self.projection.filter);
-            let (plane, f) = self.volume.plane(r.at[2]);
-            self.own.clear(window, interpolation);
-            for line in &self.line[lines.clone()] {
-                self.own.add(window, line, plane as i32, f, interpolation);
-            }
-            let mut light = self.volume.sample(window, r.at[2], &self.own, interpolation);
+            let own = &self.line[lines.clone()];
+            let mut light = self.volume.sample(window, r.at[2], own, &mut self.taps, interpolation);
             if !self.solids.is_empty() && light > 0.0 {
                 let p = layers[r.layer as usize].point(r.point as usize);
                 if solid::is_hidden(self.solids, p, self.projection) {
