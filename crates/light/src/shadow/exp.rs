@@ -23,7 +23,7 @@ pub(crate) fn exp_neg(x: f32x4) -> f32x4 {
 }
 
 /// Coefficients of 2^r by rising degree, of the least relative error on [-1/2, 1/2] with 2^0 exact.
-const POWER: [f32; 5] = [1.0, 0.693124187, 0.240240986, 0.055906483, 0.009582875];
+const POWER: [f32; 5] = [1.0, 0.693_124_2, 0.240_240_98, 0.055_906_48, 0.009_582_875];
 
 #[cfg(test)]
 mod tests {
