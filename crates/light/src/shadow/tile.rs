@@ -4,7 +4,7 @@ use super::bins::{Chunk, Point, Segment};
 use super::line::Line;
 use super::project::Projection;
 use super::settings::{Placement, ShadowSettings};
-use super::solid::{self, Solid};
+use super::solid::{self, Cover, Solid};
 use super::volume::{Taps, Volume, Window};
 use super::{ShadowHair, TILE};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -25,6 +25,7 @@ pub(crate) struct Work<'a> {
     projection: &'a Projection,
     settings: &'a ShadowSettings,
     solids: &'a [Solid<'a>],
+    cover: &'a Cover,
     /// Points of the tile behind solids.
     hidden: usize,
     volume: Volume,
@@ -48,14 +49,22 @@ struct Receiver {
     strand: u32,
     layer: u32,
     point: u32,
+    /// No solid lies between it and the light.
+    clear: bool,
 }
 
 impl<'a> Work<'a> {
-    pub fn new(projection: &'a Projection, settings: &'a ShadowSettings, solids: &'a [Solid<'a>]) -> Work<'a> {
+    pub fn new(
+        projection: &'a Projection,
+        settings: &'a ShadowSettings,
+        solids: &'a [Solid<'a>],
+        cover: &'a Cover,
+    ) -> Work<'a> {
         Work {
             projection,
             settings,
             solids,
+            cover,
             hidden: 0,
             volume: Volume::new(projection.filter, settings.slices),
             segment: Vec::new(),
@@ -142,7 +151,8 @@ impl<'a> Work<'a> {
                             from = from.min(p[2]);
                             to = to.max(p[2]);
                             let point = (chunk.first + k) as u32;
-                            self.receiver.push(Receiver { at: shift(p), strand, layer: chunk.layer as u32, point });
+                            let (layer, clear) = (chunk.layer as u32, self.cover.is_clear(p));
+                            self.receiver.push(Receiver { at: shift(p), strand, layer, point, clear });
                         }
                     }
                     if let Some(s) = chunk.segment(k, &layers[chunk.layer], self.projection) {
@@ -216,7 +226,7 @@ impl<'a> Work<'a> {
             window.put(r.at[0], r.at[1], self.projection.filter);
             let own = &self.line[lines.clone()];
             let mut light = self.volume.sample(window, r.at[2], own, &mut self.taps, interpolation);
-            if !self.solids.is_empty() && light > 0.0 {
+            if !r.clear && light > 0.0 {
                 let p = layers[r.layer as usize].point(r.point as usize);
                 if solid::is_hidden(self.solids, p, self.projection) {
                     light = 0.0;
