@@ -1,6 +1,7 @@
 //! Opacity shadow maps: error against cost, what solids cost, and speed.
 //!
-//! `cargo bench -p pelage-light --bench shadow`
+//! `cargo bench -p pelage-light --bench shadow` prints all; after it, `-- speed` only the times, `-- once SCENE` works one
+//! scene once, for a profiler.
 // A benchmark has to read the clock, which the crate itself must not.
 #![allow(clippy::disallowed_methods)]
 
@@ -20,6 +21,12 @@ const SOURCE: Source = Source::Directional { direction: Vec3::new(-0.4, -1.0, -0
 const RUNS: usize = 5;
 
 fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
+    match arguments.first().map(String::as_str) {
+        Some("speed") => return speed(),
+        Some("once") => return once(arguments.get(1).map_or("long", String::as_str)),
+        _ => {}
+    }
     println!("groom,texels,slices,placement,interpolation,filter,rms,p95,bias,seconds,megabytes");
     let grooms: [(&str, Groom); 3] =
         [("long", long(40_000, 26)), ("fur", fur(100_000, 9)), ("curly", curly(10_000, 101))];
@@ -85,7 +92,34 @@ fn median(threads: usize, layers: &[ShadowHair], solids: &[Solid], settings: &Sh
     seconds[RUNS / 2]
 }
 
-/// Prints times for 100,000 hairs of 25 segments.
+/// Hair as a shot has it: few guides, 0.3 mm wide, in segments of a centimetre, over a skin of 27,000 triangles.
+fn shot() -> (Groom, Body) {
+    let mut groom = long(14_600, 26);
+    groom.width.fill(300e-6);
+    (groom, Body::new(ball(82, BALL)))
+}
+
+/// Works one scene once on one thread.
+fn once(scene: &str) {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("threads");
+    let (groom, solids) = match scene {
+        "shot" => (shot().0, true),
+        "thin" => (shot().0, false),
+        _ => (long(100_000, 26), false),
+    };
+    let body = shot().1;
+    let solids = if solids { vec![body.view()] } else { Vec::new() };
+    for _ in 0..4 {
+        let start = Instant::now();
+        let settings = ShadowSettings::default();
+        let (light, counts) =
+            pool.install(|| transmittance(SOURCE, &[groom.view()], &solids, &settings)).expect("light");
+        let mean = light[0].iter().map(|t| f64::from(*t)).sum::<f64>() / light[0].len() as f64;
+        println!("# {scene}: {:.3} s, mean {mean:.6}, {counts:?}", start.elapsed().as_secs_f64());
+    }
+}
+
+/// Prints times for 100,000 hairs of 25 segments and for a shot.
 fn speed() {
     let groom = long(100_000, 26);
     let layers = [groom.view()];
@@ -99,4 +133,10 @@ fn speed() {
     }
     let seconds = median(2, &layers, &solids, &Quality::Default.settings());
     println!("# Default with a skin of {} triangles, 2 threads: median {seconds:.3} s", body.triangle.len());
+    let (groom, body) = shot();
+    let triangles = body.triangle.len();
+    for (solids, count) in [(vec![], 0), (vec![body.view()], triangles)] {
+        let seconds = median(1, &[groom.view()], &solids, &Quality::Default.settings());
+        println!("# shot, {} points, {count} triangles, 1 thread: median {seconds:.3} s", groom.position.len());
+    }
 }

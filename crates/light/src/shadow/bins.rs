@@ -160,7 +160,9 @@ impl Chunk {
             let width = width * projection.per_unit(0.5 * (a[2] + b[2])) * projection.stretch(&a, &b);
             if opacity > 0.0 && width > 0.0 && width < f32::MAX {
                 self.point[k].width = width;
-                self.point[k].thickness = thickness(width, opacity);
+                let (x, y) = ((b[0] - a[0]).abs(), (b[1] - a[1]).abs());
+                let slope = x.min(y) / x.max(y).max(1e-30);
+                self.point[k].thickness = thickness(width, (1.0 + slope * slope).sqrt(), opacity);
                 self.segments += 1;
             }
         }

@@ -10,25 +10,31 @@ const LINE: f32 = 0.3;
 /// Most lines of one segment.
 const LINES: f32 = 128.0;
 
-/// Deposits of a line per texel. With 1.5 they bunch and the default becomes too bright by 0.004; with 3 its error falls by
-/// 2 % and its time grows by 8 %.
-const DEPOSITS: f32 = 2.0;
-
-/// Deposits of a line per slice.
-const DEEP: f32 = 1.0;
+/// Parts of a texel's side, at most, that a line is cut into to reach every slice it passes; a line that is steeper than
+/// that stays within a texel for most of its way, and is cut into equal parts.
+const PARTS: f32 = 64.0;
 
 /// Opacity that counts as opaque: optical depth 11.5, light 1e-5.
 const OPAQUE: f32 = 0.99999;
 
+/// How many lines a hair of `width` texels is drawn as.
+#[inline]
+fn lines(width: f32) -> f32 {
+    if width <= LINE { 1.0 } else { ((width * (1.0 / LINE)) as u32 as f32 + 1.0).min(LINES) }
+}
+
 /// Optical depth per area covered: -ln(1 - o c) / c for the mean coverage c that a hair of `width` texels has of the
-/// texels it touches, weighted by itself. Hairs of one texel are independent of each other, so its mean transmittance
-/// is the product of 1 - o c. Measured at the default (long hair, fur): bias 0.001 and 0.000. With o alone, the limit for
-/// thin hairs, hairs that are not much thinner than a texel are too clear: bias +0.022, +0.031. With -ln(1 - o), right
-/// for a hair that covers the texel, thin ones are too dark: -0.121, -0.123.
-pub(crate) fn thickness(width: f32, opacity: f32) -> f32 {
-    let width = width.max(1e-6);
-    // A strip along the texels, anywhere between them.
-    let c = if width < 1.0 { width * (1.0 - width / 3.0) } else { 1.0 - 1.0 / (3.0 * width) };
+/// texels it is deposited in, weighted by itself; `slant` is its length over the columns it passes (see [`Line`]), 1 to
+/// sqrt 2. Hairs of one texel are independent of each other, so its mean transmittance is the product of 1 - o c.
+/// With o alone, the limit for thin hairs, hairs that are not much thinner than a texel are too clear: bias +0.022 (long
+/// hair), +0.031 (fur). With -ln(1 - o), right for a hair that covers the texel, thin ones are too dark: -0.121, -0.123.
+/// With no regard to the slant: +0.006 (long hair).
+pub(crate) fn thickness(width: f32, slant: f32, opacity: f32) -> f32 {
+    // What it covers of a column, anywhere between the texels. As n lines at v / n from each other it has of a texel
+    // v / n^2 times the sum over pairs of lines of the chance 1 - d that d does not part them.
+    let v = (width * slant).max(1e-6);
+    let n = lines(width);
+    let c = if v < 1.0 { v * (1.0 - v * (1.0 / 3.0) * (1.0 - 1.0 / (n * n))) } else { 1.0 - 1.0 / (3.0 * v) };
     let x = opacity * c;
     if x < 0.1 {
         opacity * (1.0 + x * (0.5 + x * (1.0 / 3.0 + x * (0.25 + x * 0.2))))
@@ -37,14 +43,35 @@ pub(crate) fn thickness(width: f32, opacity: f32) -> f32 {
     }
 }
 
-/// Deposits at `first` + k `step` for whole k below `count`: texels, and slices from 1 (layer 0 lies before the first).
+/// A line in a volume, cut where it passes from column to column of texels along the axis it mostly follows (from row to
+/// row where it mostly goes across rows): point `origin` + t `step` for t in [`from`, `to`], cut at whole t. Each part is
+/// deposited at its middle, so every column has its share exactly; deposits at equal distances from the line's end instead
+/// bunch, which at 1.5 a texel makes the default too bright by 0.004.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Line {
-    pub first: [f32; 3],
-    pub step: [f32; 3],
-    /// Optical depth of each.
-    pub each: f32,
-    pub count: u32,
+    /// Texels, and slices from 1 (layer 0 lies before the first).
+    origin: [f32; 3],
+    step: [f32; 3],
+    from: f32,
+    to: f32,
+    /// Optical depth per t.
+    each: f32,
+    /// Least x and y, and negated most x and y.
+    bounds: f32x4,
+}
+
+/// Four parts of a line: where they lie, texels and layers; optical depth of each, 0 beyond the last.
+struct Parts {
+    x: f32x4,
+    y: f32x4,
+    z: f32x4,
+    depth: f32x4,
+}
+
+/// Whole part of what is not negative.
+#[inline(always)]
+fn whole(v: f32x4) -> f32x4 {
+    v.fast_trunc_int().round_float()
 }
 
 impl Line {
@@ -65,7 +92,7 @@ impl Line {
             }
             return;
         }
-        let lines = (segment.width / LINE).ceil().min(LINES);
+        let lines = lines(segment.width);
         let (nx, ny) = (-dy / length * segment.width, dx / length * segment.width);
         for k in 0..lines as usize {
             let t = (k as f32 + 0.5) / lines - 0.5;
@@ -99,84 +126,109 @@ impl Line {
         let part = to - from;
         let d = [(b[0] - a[0]) * part, (b[1] - a[1]) * part, (b[2] - a[2]) * part];
         let start = [a[0] + (b[0] - a[0]) * from, a[1] + (b[1] - a[1]) * from, a[2] + (b[2] - a[2]) * from + 1.0];
+        let axis = usize::from(d[1].abs() > d[0].abs());
+        let reach = d[axis].abs();
         // Outside the slices one deposit is as good as many.
         let deep = d[2].abs().min(slices + 2.0);
-        let count = (DEPOSITS * d[0].abs().max(d[1].abs())).max(DEEP * deep) as u32 + 1;
-        let inverse = 1.0 / count as f32;
+        let (parts, phase) = if deep <= PARTS * reach {
+            let parts = if deep <= reach { 1.0 } else { (deep / reach) as u32 as f32 + 1.0 };
+            // From the edge that lies behind the start.
+            let ahead = if d[axis] < 0.0 { -start[axis] * parts } else { start[axis] * parts };
+            (reach * parts, ahead - floor(ahead))
+        } else {
+            (deep as u32 as f32 + 1.0, 0.0)
+        };
+        let inverse = 1.0 / parts;
         let step = d.map(|v| v * inverse);
-        let first = [start[0] + 0.5 * step[0], start[1] + 0.5 * step[1], start[2] + 0.5 * step[2]];
-        Some(Line { first, step, each: depth * part * inverse, count })
+        let origin = [0, 1, 2].map(|i| start[i] - step[i] * phase);
+        let end = [start[0] + d[0], start[1] + d[1]];
+        let bounds =
+            f32x4::new([start[0].min(end[0]), start[1].min(end[1]), -start[0].max(end[0]), -start[1].max(end[1])]);
+        Some(Line { origin, step, from: phase, to: phase + parts, each: depth * part * inverse, bounds })
     }
 
-    /// The deposits that may lie in the box [low, high) of texels: all that do, and at most a few more.
+    /// True if the line has nothing in a box, given as [high x, high y, -low x, -low y].
+    #[inline(always)]
+    pub fn misses(&self, r#box: f32x4) -> bool {
+        self.bounds.simd_ge(r#box).any()
+    }
+
+    /// Most optical depth that the line leaves in one texel.
+    #[inline(always)]
+    pub fn most(&self) -> f32 {
+        let per = self.step[0].abs().max(self.step[1].abs());
+        self.each * (1.0 / per.max(1e-3)).min(self.to - self.from)
+    }
+
+    /// The parts that may lie in the box [low, high) of texels: all that do, and at most a few more.
     #[inline]
     pub fn within(&self, low: [f32; 2], high: [f32; 2]) -> std::ops::Range<u32> {
-        let n = (self.count - 1) as f32;
-        let (mut from, mut to) = (0.0f32, n);
-        for i in 0..2 {
-            let end = self.first[i] + self.step[i] * n;
-            let (least, most) = (self.first[i].min(end), self.first[i].max(end));
-            if least >= high[i] || most < low[i] {
-                return 0..0;
-            }
-            if least < low[i] || most >= high[i] {
-                let inverse = 1.0 / self.step[i];
-                let (u, v) = ((low[i] - self.first[i]) * inverse, (high[i] - self.first[i]) * inverse);
-                from = from.max(u.min(v) - 0.01);
-                to = to.min(u.max(v) + 0.01);
-            }
-        }
-        if from > to { 0..0 } else { from.ceil() as u32..to as u32 + 1 }
+        let axis = usize::from(self.step[1].abs() > self.step[0].abs());
+        let inverse = 1.0 / self.step[axis];
+        let (u, v) = ((low[axis] - self.origin[axis]) * inverse, (high[axis] - self.origin[axis]) * inverse);
+        // Texels' edges are whole t, but for rounding.
+        let from = (u.min(v) + 0.01).max(0.0);
+        let to = (u.max(v) + 0.99).min(self.to + 1.0).max(0.0);
+        from as u32..to as u32
     }
 
-    /// Four deposits from `k` on: texel from `low` as whole numbers in [0, `end`], where `end` stands for all that is
-    /// outside; layer as a whole number; optical depth, 0 beyond the last.
-    #[inline]
-    pub fn quad(&self, k: u32, low: [f32; 2], end: [f32; 2]) -> [f32x4; 4] {
-        let t = f32x4::splat(k as f32) + f32x4::new([0.0, 1.0, 2.0, 3.0]);
-        let whole = |v: f32x4| v.fast_trunc_int().round_float();
-        let texel = |i: usize| {
-            let v = f32x4::splat(self.first[i] - low[i]) + f32x4::splat(self.step[i]) * t;
-            // What is before the window is as good as beyond it.
-            let outside = v.simd_lt(f32x4::ZERO);
-            let v = outside.select(f32x4::splat(end[i]), v);
-            whole(v.fast_min(f32x4::splat(end[i])))
+    /// Four parts from `t` on, texels kept in [0, edge] and layers in [0, end].
+    #[inline(always)]
+    fn parts(&self, t: f32x4, edge: f32x4, end: f32x4) -> Parts {
+        let (from, to) = (t.fast_max(f32x4::splat(self.from)), (t + f32x4::ONE).fast_min(f32x4::splat(self.to)));
+        let middle = (from + to) * f32x4::HALF;
+        let at = |i: usize, most: f32x4| {
+            let v = f32x4::splat(self.origin[i]) + f32x4::splat(self.step[i]) * middle;
+            whole(v.fast_max(f32x4::ZERO).fast_min(most))
         };
-        let z = f32x4::splat(self.first[2]) + f32x4::splat(self.step[2]) * t;
-        let left = (f32x4::splat(self.count as f32) - t).fast_max(f32x4::ZERO).fast_min(f32x4::ONE);
-        [texel(0), texel(1), whole(z.fast_max(f32x4::ZERO)), left * f32x4::splat(self.each)]
+        let depth = (to - from).fast_max(f32x4::ZERO) * f32x4::splat(self.each);
+        Parts { x: at(0, edge), y: at(1, edge), z: at(2, end), depth }
     }
 
-    /// Hands out the place of each deposit in an array of layers, rows and texels, four at a time and in order.
+    /// Hands out place and optical depth of each part, four at a time: places in an array of layers, rows and texels.
     /// `size` is (side, rows' length, layers' length, last layer); places up to 2^24 are exact.
     #[inline]
-    pub fn places(&self, [side, row, layer, last]: [usize; 4], mut visit: impl FnMut(usize)) {
-        let zero = f32x4::ZERO;
-        let edge = f32x4::splat(side as f32 - 0.5);
-        let end = f32x4::splat(last as f32 + 0.5);
+    pub fn places(&self, [side, row, layer, last]: [usize; 4], mut visit: impl FnMut([i32; 4], [f32; 4])) {
+        let (edge, end) = (f32x4::splat(side as f32 - 0.5), f32x4::splat(last as f32 + 0.5));
         let [rows, layers] = [row, layer].map(|v| f32x4::splat(v as f32));
-        let [fx, fy, fz] = self.first.map(f32x4::splat);
-        let [sx, sy, sz] = self.step.map(f32x4::splat);
-        let mut t = f32x4::new([0.0, 1.0, 2.0, 3.0]);
-        let mut left = self.count as usize;
-        let whole = |v: f32x4| v.fast_trunc_int().round_float();
-        loop {
-            let x = whole((fx + sx * t).fast_max(zero).fast_min(edge));
-            let y = whole((fy + sy * t).fast_max(zero).fast_min(edge));
-            let z = whole((fz + sz * t).fast_max(zero).fast_min(end));
+        let mut t = 0.0;
+        while t < self.to {
+            let Parts { x, y, z, depth } = self.parts(f32x4::splat(t) + f32x4::new(LANES), edge, end);
             let place: i32x4 = (z * layers + y * rows + x).fast_trunc_int();
-            let place = place.to_array();
-            if left <= 4 {
-                for p in &place[..left] {
-                    visit(*p as usize);
-                }
-                return;
-            }
-            for p in place {
-                visit(p as usize);
-            }
-            left -= 4;
-            t += f32x4::splat(4.0);
+            visit(place.to_array(), depth.to_array());
+            t += 4.0;
         }
     }
+
+    /// Hands out parts that lie in a box of `size` texels from `low` on: place in an array of rows of size[0], layer,
+    /// optical depth. Parts that lie outside go four to seven places behind the array. `side` and `last`
+    /// as for [`Line::places`].
+    #[inline]
+    pub fn places_within(
+        &self,
+        low: [f32; 2],
+        size: [f32; 2],
+        [side, last]: [usize; 2],
+        mut visit: impl FnMut([i32; 4], f32x4, f32x4),
+    ) {
+        let (edge, end) = (f32x4::splat(side as f32 - 0.5), f32x4::splat(last as f32 + 0.5));
+        let behind = f32x4::splat(size[0] * size[1] + 4.0) + f32x4::new(LANES);
+        for k in self.within(low, [low[0] + size[0], low[1] + size[1]]).step_by(4) {
+            let Parts { x, y, z, depth } = self.parts(f32x4::splat(k as f32) + f32x4::new(LANES), edge, end);
+            let (x, y) = (x - f32x4::splat(low[0]), y - f32x4::splat(low[1]));
+            let outside = |v: f32x4, n: f32| v.simd_lt(f32x4::ZERO) | v.simd_ge(f32x4::splat(n));
+            let outside = outside(x, size[0]) | outside(y, size[1]);
+            let place: i32x4 = outside.select(behind, y * f32x4::splat(size[0]) + x).fast_trunc_int();
+            visit(place.to_array(), z, depth);
+        }
+    }
+}
+
+const LANES: [f32; 4] = [0.0, 1.0, 2.0, 3.0];
+
+/// Largest whole number that is not larger, for sizes up to 2^31.
+#[inline(always)]
+fn floor(v: f32) -> f32 {
+    let whole = v as i32 as f32;
+    if whole > v { whole - 1.0 } else { whole }
 }

@@ -7,7 +7,8 @@
 //! resolution times the slices.
 //!
 //! A point's own hair is taken out of its footprint by the same deposits that put it in, so no bias in depth is needed.
-//! Solids are met by a ray from the point itself, so their shadows are sharp and exact; only hair is averaged over the
+//! Solids are met by a ray from the point itself, so their shadows are sharp and exact (points that lie before all that
+//! a map sees of the solids there need no ray); only hair is averaged over the
 //! footprint, and the reference does the same.
 //!
 //! Transmittance is the fraction of light that passes all *other* hairs and all solids: a hair of opacity o that lies
@@ -165,10 +166,11 @@ fn face(
             cells[c.layer][i as usize].store(0, Ordering::Relaxed);
         }
     }
+    let cover = solid::Cover::new(solids, projection);
     let (worked, hidden) = (0..grid * grid)
         .into_par_iter()
         .map_init(
-            || tile::Work::new(projection, settings, solids),
+            || tile::Work::new(projection, settings, solids, &cover),
             |work, t| match work.run(&chunks, layers, [t % grid, t / grid], t, cells) {
                 Some(hidden) => (1, hidden),
                 None => (0, 0),

@@ -117,6 +117,26 @@ impl Projection {
         }
     }
 
+    /// True for what is not between the light and any point of the map: it lies behind the light.
+    pub fn is_behind(&self, p: Vec3) -> bool {
+        self.reach.is_some() && self.local(p).z < 0.0
+    }
+
+    /// Where a point of a solid falls, with a depth that is nearer the light by `margin` scene units; `None` where the map
+    /// does not reach.
+    pub fn front(&self, p: Vec3, margin: f64) -> Option<[f32; 3]> {
+        let l = self.local(p);
+        if self.reach.is_none() {
+            return Some(self.texel(self.divide(l - Vec3::z() * margin)));
+        }
+        if l.z - margin <= self.near {
+            return None;
+        }
+        let [x, y, _] = self.divide(l);
+        let [.., depth] = self.divide(l - Vec3::z() * margin);
+        Some(self.texel([x, y, depth]))
+    }
+
     /// True if the face of a cube is the one that gives a point its value: one face for every point.
     fn owns(&self, l: Vec3) -> bool {
         let a = self.axis[0] * l.x + self.axis[1] * l.y + self.axis[2] * l.z;

@@ -50,3 +50,68 @@ pub(crate) fn is_hidden(solids: &[Solid], p: Vec3, projection: &Projection) -> b
     let Some((toward, distance)) = projection.toward(p) else { return false };
     !solids.iter().all(|s| is_lit(s, p, toward, distance, projection.size))
 }
+
+/// Texels along a side of a cell of [`Cover`], and most cells along its side: of smaller ones a mesh's triangles cover many
+/// each, in larger ones more points lie beside an edge of the mesh and take a ray.
+const CELL: f32 = 4.0;
+const CELLS: f32 = 256.0;
+
+/// How far from the light the solids begin, in squares of a map: points before that are lit without a ray.
+pub(crate) struct Cover {
+    side: usize,
+    /// Cells per texel.
+    scale: f32,
+    /// Least depth of what lies over a cell.
+    near: Vec<f32>,
+}
+
+impl Cover {
+    pub fn new(solids: &[Solid], projection: &Projection) -> Cover {
+        let texels = projection.texels as f32;
+        let scale = 1.0 / CELL.max(texels / CELLS);
+        let side = (texels * scale) as usize + 1;
+        let mut cover = Cover { side, scale, near: vec![f32::INFINITY; side * side] };
+        let on = 2.0 * ON * projection.size;
+        for solid in solids {
+            for triangle in solid.triangle {
+                let corner = triangle.map(|v| Vec3::from(solid.position[v as usize]));
+                if corner.iter().all(|p| projection.is_behind(*p)) {
+                    continue;
+                }
+                let [Some(a), Some(b), Some(c)] = corner.map(|p| projection.front(p, on)) else {
+                    // It reaches past the light, where its image has no bounds.
+                    cover.near.fill(f32::NEG_INFINITY);
+                    return cover;
+                };
+                cover.add([a, b, c]);
+            }
+        }
+        cover
+    }
+
+    /// Marks the cells in the box of a triangle. Depth is linear over it, so it is least at a corner.
+    fn add(&mut self, corner: [[f32; 3]; 3]) {
+        let least = |i: usize| corner[0][i].min(corner[1][i]).min(corner[2][i]);
+        let most = |i: usize| corner[0][i].max(corner[1][i]).max(corner[2][i]);
+        let end = (self.side - 1) as f32;
+        // Rounding of a point's place is under 1e-3 texels.
+        let cells = [0, 1].map(|i| [(least(i) - 0.01) * self.scale, (most(i) + 0.01) * self.scale]);
+        if cells.iter().any(|c| c[1] < 0.0 || c[0] > end + 1.0) {
+            return;
+        }
+        let [x, y] = cells.map(|c| c[0].clamp(0.0, end) as usize..=c[1].clamp(0.0, end) as usize);
+        let depth = least(2);
+        for row in y {
+            for near in &mut self.near[row * self.side..][x.clone()] {
+                *near = near.min(depth);
+            }
+        }
+    }
+
+    /// True if no solid lies between the light and a point with these coordinates on the map.
+    #[inline]
+    pub fn is_clear(&self, at: [f32; 3]) -> bool {
+        let cell = |v: f32| ((v * self.scale) as usize).min(self.side - 1);
+        at[2] < self.near[cell(at[1]) * self.side + cell(at[0])]
+    }
+}

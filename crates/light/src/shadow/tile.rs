@@ -4,8 +4,8 @@ use super::bins::{Chunk, Point, Segment};
 use super::line::Line;
 use super::project::Projection;
 use super::settings::{Placement, ShadowSettings};
-use super::solid::{self, Solid};
-use super::volume::{Own, Volume, Window};
+use super::solid::{self, Cover, Solid};
+use super::volume::{Taps, Volume, Window};
 use super::{ShadowHair, TILE};
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -43,6 +43,7 @@ pub(crate) struct Work<'a> {
     projection: &'a Projection,
     settings: &'a ShadowSettings,
     solids: &'a [Solid<'a>],
+    cover: &'a Cover,
     /// Points of the tile behind solids.
     hidden: usize,
     volume: Volume,
@@ -52,7 +53,7 @@ pub(crate) struct Work<'a> {
     receiver: Vec<Receiver>,
     line: Vec<Line>,
     warp: Vec<f32>,
-    own: Own,
+    taps: Taps,
     window: Window,
 }
 
@@ -68,14 +69,22 @@ struct Receiver {
     strand: u32,
     layer: u32,
     point: u32,
+    /// No solid lies between it and the light.
+    clear: bool,
 }
 
 impl<'a> Work<'a> {
-    pub fn new(projection: &'a Projection, settings: &'a ShadowSettings, solids: &'a [Solid<'a>]) -> Work<'a> {
+    pub fn new(
+        projection: &'a Projection,
+        settings: &'a ShadowSettings,
+        solids: &'a [Solid<'a>],
+        cover: &'a Cover,
+    ) -> Work<'a> {
         Work {
             projection,
             settings,
             solids,
+            cover,
             hidden: 0,
             volume: Volume::new(projection.filter, settings.slices),
             segment: Vec::new(),
@@ -83,7 +92,7 @@ impl<'a> Work<'a> {
             receiver: Vec::new(),
             line: Vec::new(),
             warp: Vec::new(),
-            own: Own::new(),
+            taps: Taps::new(),
             window: Window::new(),
         }
     }
@@ -164,7 +173,8 @@ impl<'a> Work<'a> {
                             from = from.min(p[2]);
                             to = to.max(p[2]);
                             let point = (chunk.first + k) as u32;
-                            self.receiver.push(Receiver { at: shift(p), strand, layer: chunk.layer as u32, point });
+                            let (layer, clear) = (chunk.layer as u32, self.cover.is_clear(p));
+                            self.receiver.push(Receiver { at: shift(p), strand, layer, point, clear });
                         }
                     }
                     if let Some(s) = chunk.segment(k, &layers[chunk.layer], self.projection) {
@@ -238,13 +248,9 @@ impl<'a> Work<'a> {
         for r in &self.receiver[receivers] {
             let window = &mut self.window;
             window.put(r.at[0], r.at[1], self.projection.filter);
-            let (plane, f) = self.volume.plane(r.at[2]);
-            self.own.clear(window, interpolation);
-            for line in &self.line[lines.clone()] {
-                self.own.add(window, line, plane as i32, f, interpolation);
-            }
-            let mut light = self.volume.sample(window, r.at[2], &self.own, interpolation);
-            if !self.solids.is_empty() && light > 0.0 {
+            let own = &self.line[lines.clone()];
+            let mut light = self.volume.sample(window, r.at[2], own, &mut self.taps, interpolation);
+            if !r.clear && light > 0.0 {
                 let p = layers[r.layer as usize].point(r.point as usize);
                 if solid::is_hidden(self.solids, p, self.projection) {
                     light = 0.0;

@@ -4,10 +4,13 @@ use super::TILE;
 use super::exp::exp_neg;
 use super::line::Line;
 use super::settings::Interpolation;
-use wide::{f32x4, i32x4};
+use wide::f32x4;
 
 /// Taps of the widest filter along a side, a multiple of 4.
 pub(crate) const TAPS: usize = 20;
+
+/// Optical depth that counts as no light: 6e-6 of it is left. Lower, the sum of what is lost shows in the mean.
+const DARK: f32 = 12.0;
 
 /// Layers of texels: layer 0 holds what lies before the first slice plane, layer k what lies between planes k - 1 and
 /// k, and the last one what lies beyond the last plane. After [`Volume::sum`] layer k is what lies before plane k.
@@ -36,83 +39,32 @@ impl Window {
     /// Moves to the square of side `filter` around (x, y).
     #[inline]
     pub fn put(&mut self, x: f32, y: f32, filter: f32) {
-        let inverse = 1.0 / filter;
+        let inverse = f32x4::splat(1.0 / filter);
         let place = |v: f32, weight: &mut [f32; TAPS]| {
             let (low, high) = (v - 0.5 * filter, v + 0.5 * filter);
             let first = low as i32;
             let taps = ((high as i32 - first + 1) as usize).min(TAPS - 3);
-            for (k, weight) in weight[..taps.next_multiple_of(4)].iter_mut().enumerate() {
-                let at = (first + k as i32) as f32;
-                *weight = ((at + 1.0).min(high) - at.max(low)).max(0.0) * inverse;
+            let (low, high) = (f32x4::splat(low), f32x4::splat(high));
+            let mut at = f32x4::splat(first as f32) + f32x4::new([0.0, 1.0, 2.0, 3.0]);
+            for quad in weight.chunks_exact_mut(4).take(taps.div_ceil(4)) {
+                let cover = (at + f32x4::ONE).fast_min(high) - at.fast_max(low);
+                quad.copy_from_slice(&(cover.fast_max(f32x4::ZERO) * inverse).to_array());
+                at += f32x4::splat(4.0);
             }
             (first, taps)
         };
         (self.x, self.across) = place(x, &mut self.weight[0]);
         (self.y, self.down) = place(y, &mut self.weight[1]);
     }
-
-    /// Its texels as a box.
-    #[inline]
-    fn bounds(&self) -> ([f32; 2], [f32; 2]) {
-        let low = [self.x as f32, self.y as f32];
-        (low, [low[0] + self.across as f32, low[1] + self.down as f32])
-    }
 }
 
-/// Optical depth that the hair itself puts into the window of one of its points, for the planes that are interpolated.
-pub(crate) struct Own([[f32; TAPS * TAPS]; 4]);
+/// Optical depth in the texels of a window, row by row without gaps, at each of the planes that are interpolated. Behind
+/// them a quad may jut out by three, and four more stand for what lies outside.
+pub(crate) struct Taps([[f32; TAPS * TAPS + 8]; 4]);
 
-impl Own {
-    pub fn new() -> Own {
-        Own([[0.0; TAPS * TAPS]; 4])
-    }
-
-    #[inline]
-    pub fn clear(&mut self, window: &Window, interpolation: Interpolation) {
-        let quads = window.across.div_ceil(4) * 4;
-        for plane in &mut self.0[..planes(interpolation)] {
-            for row in plane.chunks_exact_mut(TAPS).take(window.down) {
-                row[..quads].fill(0.0);
-            }
-        }
-    }
-
-    /// Adds a line of the hair for a point at `f` between planes `plane` and `plane` + 1. What is outside the window
-    /// goes to where no weight is.
-    #[inline]
-    pub fn add(&mut self, window: &Window, line: &Line, plane: i32, f: f32, interpolation: Interpolation) {
-        let (low, high) = window.bounds();
-        let end = [window.across, window.down].map(|n| n as f32);
-        for k in line.within(low, high).step_by(4) {
-            let [x, y, z, depth] = line.quad(k, low, end);
-            let place: i32x4 = (y * f32x4::splat(TAPS as f32) + x).fast_trunc_int();
-            if interpolation == Interpolation::OpticalDepth {
-                // All of what lies before the plane, f of what lies between it and the next.
-                let seen = f32x4::splat(plane as f32 + 1.0 + f) - z;
-                let seen = (seen.fast_max(f32x4::ZERO).fast_min(f32x4::ONE) * depth).to_array();
-                for (p, d) in place.to_array().into_iter().zip(seen) {
-                    self.0[0][p as usize] += d;
-                }
-                continue;
-            }
-            let first = if interpolation == Interpolation::Cubic { plane - 1 } else { plane };
-            for ((p, z), d) in place.to_array().into_iter().zip(z.to_array()).zip(depth.to_array()) {
-                for (k, own) in self.0[..planes(interpolation)].iter_mut().enumerate() {
-                    if z <= (first + k as i32) as f32 {
-                        own[p as usize] += d;
-                    }
-                }
-            }
-        }
-    }
-}
-
-/// Planes for which the hair's own depth is kept apart.
-fn planes(interpolation: Interpolation) -> usize {
-    match interpolation {
-        Interpolation::OpticalDepth => 1,
-        Interpolation::Transmittance => 2,
-        Interpolation::Cubic => 4,
+impl Taps {
+    pub fn new() -> Taps {
+        Taps([[0.0; TAPS * TAPS + 8]; 4])
     }
 }
 
@@ -147,7 +99,11 @@ impl Volume {
     pub fn add(&mut self, line: &Line) {
         let depth = &mut self.depth[..];
         let size = [self.side, self.stride, self.stride * self.side, self.slices + 1];
-        line.places(size, |p| depth[p] += line.each);
+        line.places(size, |places, parts| {
+            for (p, d) in places.into_iter().zip(parts) {
+                depth[p as usize] += d;
+            }
+        });
     }
 
     /// From parts to sums along the light.
@@ -161,35 +117,116 @@ impl Volume {
         }
     }
 
-    /// Mean transmittance over a window at slice coordinate `s` in [0, slices], without what the hair itself takes. The mean
-    /// is over transmittance, as a footprint's is: of mean optical depth it would be too dark, at the default by 0.017 in
-    /// long hair and 0.027 in fur.
+    /// Mean transmittance over a window at slice coordinate `s` in [0, slices], without what the lines of the hair itself
+    /// take. The mean is over transmittance, as a footprint's is: of mean optical depth it would be too dark, at the
+    /// default by 0.017 in long hair and 0.027 in fur.
     #[inline]
-    pub fn sample(&self, window: &Window, s: f32, own: &Own, interpolation: Interpolation) -> f32 {
+    pub fn sample(&self, window: &Window, s: f32, own: &[Line], taps: &mut Taps, interpolation: Interpolation) -> f32 {
+        match interpolation {
+            Interpolation::OpticalDepth => self.sample_as::<1>(window, s, own, taps),
+            Interpolation::Transmittance => self.sample_as::<2>(window, s, own, taps),
+            Interpolation::Cubic => self.sample_as::<4>(window, s, own, taps),
+        }
+    }
+
+    /// [`Volume::sample`] with optical depth kept apart at this many planes: 1 for linear optical depth, 2 for linear
+    /// transmittance, 4 for the cubic.
+    #[inline]
+    fn sample_as<const PLANES: usize>(&self, window: &Window, s: f32, own: &[Line], taps: &mut Taps) -> f32 {
         let (plane, f) = self.plane(s);
-        let layer = self.stride * self.side;
-        let corner = window.y as usize * self.stride + window.x as usize;
         let f4 = f32x4::splat(f);
-        let row_of =
-            |v: &[f32], start: usize| f32x4::from(<[f32; 4]>::try_from(&v[start..start + 4]).unwrap_or_default());
+        let (across, count) = (window.across, window.across * window.down);
+        let least = self.read::<PLANES>(window, plane, f4, taps);
+        if PLANES == 1 && least > DARK + own.iter().map(Line::most).sum::<f32>() {
+            return 0.0;
+        }
+        self.take::<PLANES>(window, plane, f4, own, taps);
+        let taps = &mut taps.0;
+        for k in (0..count).step_by(4) {
+            let at = |p: usize| quad(&taps[p], k);
+            let light = match PLANES {
+                1 => exp_neg(at(0)),
+                2 => {
+                    let (a, b) = (exp_neg(at(0)), exp_neg(at(1)));
+                    a + (b - a) * f4
+                }
+                _ => exp_neg(cubic(at(0), at(1), at(2), at(3), f4)),
+            };
+            taps[0][k..k + 4].copy_from_slice(&light.to_array());
+        }
+        // What juts out of a row is some light with weight 0.
         let mut sum = f32x4::ZERO;
-        for row in 0..window.down {
+        for (row, weight) in window.weight[1][..window.down].iter().enumerate() {
             let mut line = f32x4::ZERO;
-            for x in (0..window.across).step_by(4) {
-                let light = shade(
-                    interpolation,
-                    plane,
-                    self.slices,
-                    f4,
-                    |p| row_of(&self.depth, p * layer + corner + row * self.stride + x),
-                    |k| row_of(&own.0[k], row * TAPS + x),
-                );
-                line += light * row_of(&window.weight[0], x);
+            for x in (0..across).step_by(4) {
+                line += quad(&taps[0], row * across + x) * quad(&window.weight[0], x);
             }
-            sum += line * f32x4::splat(window.weight[1][row]);
+            sum += line * f32x4::splat(*weight);
         }
         let [a, b, c, d] = sum.to_array();
         ((a + b) + (c + d)).clamp(0.0, 1.0)
+    }
+
+    /// Fills the taps; the least of them.
+    #[inline]
+    fn read<const PLANES: usize>(&self, window: &Window, plane: usize, f: f32x4, taps: &mut Taps) -> f32 {
+        let layer = self.stride * self.side;
+        let corner = window.y as usize * self.stride + window.x as usize;
+        let mut least = f32x4::splat(f32::MAX);
+        for row in 0..window.down {
+            for x in (0..window.across).step_by(4) {
+                let at = |p: usize| quad(&self.depth, p * layer + corner + row * self.stride + x);
+                let to = row * window.across + x;
+                let mut put = |k: usize, v: f32x4| taps.0[k][to..to + 4].copy_from_slice(&v.to_array());
+                let (a, b) = (at(plane), at(plane + 1));
+                match PLANES {
+                    1 => {
+                        let v = a + (b - a) * f;
+                        least = least.fast_min(v);
+                        put(0, v);
+                    }
+                    2 => {
+                        put(0, a);
+                        put(1, b);
+                    }
+                    _ => {
+                        put(0, if plane > 0 { at(plane - 1) } else { a });
+                        put(1, a);
+                        put(2, b);
+                        put(3, if plane + 2 <= self.slices { at(plane + 2) } else { b });
+                    }
+                }
+            }
+        }
+        let [a, b, c, d] = least.to_array();
+        a.min(b).min(c.min(d))
+    }
+
+    /// Takes the hair's own lines out of the taps.
+    #[inline]
+    fn take<const PLANES: usize>(&self, window: &Window, plane: usize, f: f32x4, own: &[Line], taps: &mut Taps) {
+        let low = [window.x as f32, window.y as f32];
+        let size = [window.across as f32, window.down as f32];
+        let around = f32x4::new([low[0] + size[0], low[1] + size[1], -low[0], -low[1]]);
+        let seen = f32x4::splat(plane as f32 + 1.0) + f;
+        for line in own.iter().filter(|l| !l.misses(around)) {
+            line.places_within(low, size, [self.side, self.slices + 1], |places, z, depth| {
+                for (k, taps) in taps.0[..PLANES].iter_mut().enumerate() {
+                    let part = if PLANES == 1 {
+                        // All of what lies before the plane, f of what lies between it and the next.
+                        (seen - z).fast_max(f32x4::ZERO).fast_min(f32x4::ONE)
+                    } else {
+                        let first = if PLANES == 2 { plane as f32 } else { plane as f32 - 1.0 };
+                        // What stands for a plane that is not there is the one next to it.
+                        let at = (first + k as f32).clamp(0.0, self.slices as f32);
+                        (f32x4::splat(at + 1.0) - z).fast_max(f32x4::ZERO).fast_min(f32x4::ONE)
+                    };
+                    for (p, d) in places.into_iter().zip((part * depth).to_array()) {
+                        taps[p as usize] -= d;
+                    }
+                }
+            });
+        }
     }
 
     /// Plane before slice coordinate `s`, and how far between it and the next.
@@ -201,30 +238,10 @@ impl Volume {
     }
 }
 
-/// Transmittance of four texels at `f` after `plane`, from the depths at planes and what of them is the hair's own.
+/// Four numbers from `start` on.
 #[inline(always)]
-fn shade(
-    interpolation: Interpolation,
-    plane: usize,
-    slices: usize,
-    f: f32x4,
-    at: impl Fn(usize) -> f32x4,
-    own: impl Fn(usize) -> f32x4,
-) -> f32x4 {
-    let (a, b) = (at(plane), at(plane + 1));
-    match interpolation {
-        Interpolation::OpticalDepth => exp_neg(a + (b - a) * f - own(0)),
-        Interpolation::Transmittance => {
-            let (a, b) = (exp_neg(a - own(0)), exp_neg(b - own(1)));
-            a + (b - a) * f
-        }
-        Interpolation::Cubic => {
-            let (a, b) = (a - own(1), b - own(2));
-            let before = if plane > 0 { at(plane - 1) - own(0) } else { a };
-            let after = if plane + 2 <= slices { at(plane + 2) - own(3) } else { b };
-            exp_neg(cubic(before, a, b, after, f))
-        }
-    }
+fn quad(v: &[f32], start: usize) -> f32x4 {
+    f32x4::from(<[f32; 4]>::try_from(&v[start..start + 4]).unwrap_or_default())
 }
 
 /// Catmull-Rom between `b` and `c`, kept between them: optical depth never falls along a ray.
