@@ -1,7 +1,7 @@
 //! Opacity shadow maps: error against cost, what solids cost, and speed.
 //!
-//! `cargo bench -p pelage-light --bench shadow` prints all; after it, `-- speed` only the times, `-- once SCENE` works one
-//! scene once, for a profiler.
+//! `cargo bench -p pelage-light --bench shadow` prints all; with `-- measured` only the errors of the settings in `MEASURED`,
+//! with `-- speed` only times, with `-- once SCENE` it works one scene (long, shot, thin) four times, for a profiler.
 // A benchmark has to read the clock, which the crate itself must not.
 #![allow(clippy::disallowed_methods)]
 
@@ -11,8 +11,8 @@ mod common;
 use common::{BALL, Body, Groom, ball, curly, fur, long, score, some_points};
 use pelage_geom::Vec3;
 use pelage_light::shadow::{
-    Footprint, Interpolation, Placement, Quality, Sample, ShadowHair, ShadowSettings, Solid, Source, transmittance,
-    transmittance_exact,
+    Footprint, Interpolation, MEASURED, Placement, Quality, Sample, ShadowHair, ShadowSettings, Solid, Source,
+    transmittance, transmittance_exact,
 };
 use std::hint::black_box;
 use std::time::Instant;
@@ -27,17 +27,20 @@ fn main() {
         Some("once") => return once(arguments.get(1).map_or("long", String::as_str)),
         _ => {}
     }
+    let measured = arguments.first().is_some_and(|a| a == "measured");
     println!("groom,texels,slices,placement,interpolation,filter,rms,p95,bias,seconds,megabytes");
     let grooms: [(&str, Groom); 3] =
         [("long", long(40_000, 26)), ("fur", fur(100_000, 9)), ("curly", curly(10_000, 101))];
     for (name, groom) in &grooms {
-        errors(name, groom);
+        errors(name, groom, measured);
     }
-    speed();
+    if !measured {
+        speed();
+    }
 }
 
 /// Prints the table of one groom.
-fn errors(name: &str, groom: &Groom) {
+fn errors(name: &str, groom: &Groom, measured: bool) {
     let layers = [groom.view()];
     let points = some_points(&layers, 1500);
     let footprint = Footprint { side: 1.0 / 256.0, rays: 1024, seed: 1 };
@@ -46,6 +49,12 @@ fn errors(name: &str, groom: &Groom) {
     let each = start.elapsed().as_secs_f64() / points.len() as f64 / 1058.0;
     println!("# {name}: {} points, exact {:.2} us a ray", groom.position.len(), 1e6 * each);
     let row = |settings| row(name, &layers, &points, &truth, settings);
+    for m in MEASURED {
+        row(ShadowSettings { texels: m.texels, slices: m.slices, ..Default::default() });
+    }
+    if measured {
+        return;
+    }
     for texels in [256, 512, 1024, 2048] {
         for slices in [16, 32, 64, 128] {
             for placement in [Placement::Uniform, Placement::Histogram] {
@@ -99,7 +108,7 @@ fn shot() -> (Groom, Body) {
     (groom, Body::new(ball(82, BALL)))
 }
 
-/// Works one scene once on one thread.
+/// Works one scene on one thread.
 fn once(scene: &str) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("threads");
     let (groom, solids) = match scene {

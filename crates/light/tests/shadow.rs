@@ -183,12 +183,12 @@ fn lights_near_and_inside_are_as_right_as_far_ones() {
     let at = |x, y, z| Source::Point { position: Vec3::new(x, y, z) };
     let direction = Vec3::new(-0.3, -1.0, -0.2);
     let spot = Source::Spot { position: Vec3::new(0.1, 0.5, 0.1), direction, cone: 0.2, softness: 0.05 };
-    for (source, bar) in [(at(0.3, 0.6, 0.2), 0.022), (at(0.14, 0.16, 0.05), 0.03), (spot, 0.03)] {
+    for source in [at(0.3, 0.6, 0.2), at(0.14, 0.16, 0.05), spot] {
         let truth = transmittance_exact(source, &layers, &[], &FOOTPRINT, &points).expect("light");
         let light = map(source, &layers, &Quality::Default.settings());
         let [rms, _, bias] = score(&light, &points, &truth);
         println!("{source:?}: rms {rms:.4} bias {bias:+.4}");
-        assert!(rms <= bar && bias.abs() <= 0.005, "{source:?}: {rms} {bias}");
+        assert!(rms <= 0.02 && bias.abs() <= 0.005, "{source:?}: {rms} {bias}");
     }
     let (light, counts) = transmittance(spot, &layers, &[], &ShadowSettings::default()).expect("light");
     let dark = light[0].iter().filter(|t| **t == 0.0).count();

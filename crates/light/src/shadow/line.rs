@@ -36,8 +36,12 @@ pub(crate) fn thickness(width: f32, slant: f32, opacity: f32) -> f32 {
     let n = lines(width);
     let c = if v < 1.0 { v * (1.0 - v * (1.0 / 3.0) * (1.0 - 1.0 / (n * n))) } else { 1.0 - 1.0 / (3.0 * v) };
     let x = opacity * c;
-    if x < 0.1 {
-        opacity * (1.0 + x * (0.5 + x * (1.0 / 3.0 + x * (0.25 + x * 0.2))))
+    if x < 0.5 {
+        // 2 artanh(s) in powers of s up to 1/3; what is left out is under 1e-6 of it.
+        let s = x / (2.0 - x);
+        let q = s * s;
+        let series = 1.0 + q * (1.0 / 3.0 + q * (1.0 / 5.0 + q * (1.0 / 7.0 + q * (1.0 / 9.0))));
+        opacity * 2.0 / (2.0 - x) * series
     } else {
         -libm::logf(1.0 - x.min(OPAQUE)) / c
     }
@@ -54,6 +58,8 @@ pub(crate) struct Line {
     step: [f32; 3],
     from: f32,
     to: f32,
+    /// t per texel along the axis that the line mostly follows.
+    rate: f32,
     /// Optical depth per t.
     each: f32,
     /// Least x and y, and negated most x and y.
@@ -138,13 +144,13 @@ impl Line {
         } else {
             (deep as u32 as f32 + 1.0, 0.0)
         };
-        let inverse = 1.0 / parts;
+        let (inverse, rate) = (1.0 / parts, parts / d[axis]);
         let step = d.map(|v| v * inverse);
         let origin = [0, 1, 2].map(|i| start[i] - step[i] * phase);
         let end = [start[0] + d[0], start[1] + d[1]];
         let bounds =
             f32x4::new([start[0].min(end[0]), start[1].min(end[1]), -start[0].max(end[0]), -start[1].max(end[1])]);
-        Some(Line { origin, step, from: phase, to: phase + parts, each: depth * part * inverse, bounds })
+        Some(Line { origin, step, from: phase, to: phase + parts, rate, each: depth * part * inverse, bounds })
     }
 
     /// True if the line has nothing in a box, given as [high x, high y, -low x, -low y].
@@ -156,16 +162,14 @@ impl Line {
     /// Most optical depth that the line leaves in one texel.
     #[inline(always)]
     pub fn most(&self) -> f32 {
-        let per = self.step[0].abs().max(self.step[1].abs());
-        self.each * (1.0 / per.max(1e-3)).min(self.to - self.from)
+        self.each * self.rate.abs().min(self.to - self.from)
     }
 
     /// The parts that may lie in the box [low, high) of texels: all that do, and at most a few more.
     #[inline]
     pub fn within(&self, low: [f32; 2], high: [f32; 2]) -> std::ops::Range<u32> {
         let axis = usize::from(self.step[1].abs() > self.step[0].abs());
-        let inverse = 1.0 / self.step[axis];
-        let (u, v) = ((low[axis] - self.origin[axis]) * inverse, (high[axis] - self.origin[axis]) * inverse);
+        let (u, v) = ((low[axis] - self.origin[axis]) * self.rate, (high[axis] - self.origin[axis]) * self.rate);
         // Texels' edges are whole t, but for rounding.
         let from = (u.min(v) + 0.01).max(0.0);
         let to = (u.max(v) + 0.99).min(self.to + 1.0).max(0.0);

@@ -1,6 +1,6 @@
 //! The plane across the light: where a point falls on it and how deep it lies.
 
-use super::settings::ShadowSettings;
+use super::settings::{ShadowSettings, WIDEST};
 use super::{BadSource, ShadowCounts, ShadowHair, Source};
 use pelage_geom::Vec3;
 use rayon::prelude::*;
@@ -284,6 +284,16 @@ fn unit(v: Vec3) -> Result<Vec3, BadSource> {
     Ok((v / largest).normalize())
 }
 
+/// Texels of a cube's face for each that is asked for: hair on a face lies at all distances from the light, and much of it
+/// near, where a hair spans many texels. With 1 the RMS error at the default is 0.0247 in long hair.
+const FACE: f64 = 1.5;
+
+/// Texels along a side of a cube's face.
+fn face_texels(settings: &ShadowSettings) -> usize {
+    let most = if settings.filter > 0.0 { (WIDEST / settings.filter) as usize } else { usize::MAX };
+    ((settings.texels as f64 * FACE) as usize).min(most).max(settings.texels)
+}
+
 /// The maps of a light: one, or six where it is inside the hair or near it, or none without hair.
 pub(crate) fn fit(
     source: Source,
@@ -314,10 +324,11 @@ pub(crate) fn fit(
         layers.iter().map(|l| (0..l.position.len()).into_par_iter().filter(|&i| !is_usable(l.point(i))).count()).sum();
     let common = |axis, eye, reach, low, side: f64, cube| {
         let side = side.max(1e-30);
-        let scale = settings.texels as f64 / side;
-        let filter = (settings.filter * settings.texels as f64).max(1.0) as f32;
+        let texels = if cube { face_texels(settings) } else { settings.texels };
+        let scale = texels as f64 / side;
+        let filter = (settings.filter * texels as f64).max(1.0) as f32;
         let near = NEAR * size;
-        Projection { axis, eye, reach, near, low, scale, texels: settings.texels, filter, cube, cone, size }
+        Projection { axis, eye, reach, near, low, scale, texels, filter, cube, cone, size }
     };
     let away = position.map(|p| (p, centre - p, (centre - p).norm()));
     match away {

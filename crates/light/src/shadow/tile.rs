@@ -5,7 +5,7 @@ use super::line::Line;
 use super::project::Projection;
 use super::settings::{Placement, ShadowSettings};
 use super::solid::{self, Cover, Solid};
-use super::volume::{Taps, Volume, Window};
+use super::volume::{Own, Taps, Volume, Window};
 use super::{ShadowHair, TILE};
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -245,11 +245,11 @@ impl<'a> Work<'a> {
         cells: &[Vec<AtomicU32>],
     ) {
         let interpolation = self.settings.interpolation;
+        let own = Own::new(&self.line[lines]);
         for r in &self.receiver[receivers] {
             let window = &mut self.window;
             window.put(r.at[0], r.at[1], self.projection.filter);
-            let own = &self.line[lines.clone()];
-            let mut light = self.volume.sample(window, r.at[2], own, &mut self.taps, interpolation);
+            let mut light = self.volume.sample(window, r.at[2], &own, &mut self.taps, interpolation);
             if !r.clear && light > 0.0 {
                 let p = layers[r.layer as usize].point(r.point as usize);
                 if solid::is_hidden(self.solids, p, self.projection) {

@@ -58,6 +58,19 @@ impl Window {
     }
 }
 
+/// The lines of one hair.
+pub(crate) struct Own<'a> {
+    lines: &'a [Line],
+    /// Optical depth, the hair's own included, from which on no light is left.
+    dark: f32,
+}
+
+impl<'a> Own<'a> {
+    pub fn new(lines: &'a [Line]) -> Own<'a> {
+        Own { lines, dark: DARK + lines.iter().map(Line::most).sum::<f32>() }
+    }
+}
+
 /// Optical depth in the texels of a window, row by row without gaps, at each of the planes that are interpolated. Behind
 /// them a quad may jut out by three, and four more stand for what lies outside.
 pub(crate) struct Taps([[f32; TAPS * TAPS + 8]; 4]);
@@ -121,7 +134,7 @@ impl Volume {
     /// take. The mean is over transmittance, as a footprint's is: of mean optical depth it would be too dark, at the
     /// default by 0.017 in long hair and 0.027 in fur.
     #[inline]
-    pub fn sample(&self, window: &Window, s: f32, own: &[Line], taps: &mut Taps, interpolation: Interpolation) -> f32 {
+    pub fn sample(&self, window: &Window, s: f32, own: &Own, taps: &mut Taps, interpolation: Interpolation) -> f32 {
         match interpolation {
             Interpolation::OpticalDepth => self.sample_as::<1>(window, s, own, taps),
             Interpolation::Transmittance => self.sample_as::<2>(window, s, own, taps),
@@ -132,15 +145,15 @@ impl Volume {
     /// [`Volume::sample`] with optical depth kept apart at this many planes: 1 for linear optical depth, 2 for linear
     /// transmittance, 4 for the cubic.
     #[inline]
-    fn sample_as<const PLANES: usize>(&self, window: &Window, s: f32, own: &[Line], taps: &mut Taps) -> f32 {
+    fn sample_as<const PLANES: usize>(&self, window: &Window, s: f32, own: &Own, taps: &mut Taps) -> f32 {
         let (plane, f) = self.plane(s);
         let f4 = f32x4::splat(f);
         let (across, count) = (window.across, window.across * window.down);
         let least = self.read::<PLANES>(window, plane, f4, taps);
-        if PLANES == 1 && least > DARK + own.iter().map(Line::most).sum::<f32>() {
+        if PLANES == 1 && least > own.dark {
             return 0.0;
         }
-        self.take::<PLANES>(window, plane, f4, own, taps);
+        self.take::<PLANES>(window, plane, f4, own.lines, taps);
         let taps = &mut taps.0;
         for k in (0..count).step_by(4) {
             let at = |p: usize| quad(&taps[p], k);
