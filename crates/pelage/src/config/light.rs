@@ -87,7 +87,7 @@ pub struct Shadow {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum ShadowQuality {
-    /// For a first look.
+    /// For a first look: half the default's texels each way.
     Draft,
     /// Where the measured curve of error against time bends.
     #[default]
