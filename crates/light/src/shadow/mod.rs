@@ -1,7 +1,7 @@
 //! Opacity shadow maps: how much light of a source reaches every point of every hair, past other hairs and solids.
 //!
 //! The method is Kim's (opacity shadow maps, SIGGRAPH 2003 course notes, §4) cut into tiles: the plane across the light
-//! is divided into squares of [`TILE`] texels, the hair segments are sorted into them, and each tile sums optical depth
+//! is divided into squares of `TILE` texels, the hair segments are sorted into them, and each tile sums optical depth
 //! into slices of its own, samples its own points and is forgotten. Tiles are independent, so the bytes are the same
 //! for any number of threads, and memory is 32 bytes a point, about 7 a segment and one tile a thread, whatever the
 //! resolution times the slices.

@@ -214,7 +214,7 @@ fn draw(
             None => Ok(Vec::new()),
         })
         .collect::<Result<Vec<Vec<[f32; 3]>>, Error>>()?;
-    let (lights, lit) = lights(run, drawn, camera, frame)?;
+    let Lit { lights, transmittance } = lights(run, drawn, camera, frame)?;
     let views: Vec<HairView<'_>> = (0..layers.len())
         .map(|i| HairView {
             offsets: &layers[i].offsets,
@@ -224,7 +224,7 @@ fn draw(
             color: &layers[i].color,
             opacity: if wet[i].1.is_empty() { &layers[i].opacity } else { &wet[i].1 },
             root_normal: &normals[i],
-            transmittance: &lit[i],
+            transmittance: &transmittance[i],
         })
         .collect();
     let skin = if pose.is_some() { Some(groom::skin(run)?) } else { None };
@@ -238,17 +238,18 @@ fn draw(
     Ok(render_region(&scene, camera, size.map(|x| x as usize), region, &Settings::default()).0)
 }
 
+/// Lights, and for each layer what arrives of each light at the points that are drawn; nothing where that is not known.
+struct Lit {
+    lights: Vec<Light>,
+    transmittance: Vec<Vec<Vec<f32>>>,
+}
+
 /// The lights of a frame with what arrives of each at the hairs that are drawn; three that move with the camera where the
 /// shot has none.
-fn lights(
-    run: &mut Runner<'_>,
-    drawn: &Drawn,
-    camera: &Camera,
-    frame: i32,
-) -> Result<(Vec<Light>, Vec<Vec<Vec<f32>>>), Error> {
-    let mut lit: Vec<Vec<Vec<f32>>> = vec![Vec::new(); drawn.layers.len()];
+fn lights(run: &mut Runner<'_>, drawn: &Drawn, camera: &Camera, frame: i32) -> Result<Lit, Error> {
+    let mut transmittance = vec![Vec::new(); drawn.layers.len()];
     if run.project.shot.value.light.is_empty() {
-        return Ok((studio_lights(camera), lit));
+        return Ok(Lit { lights: studio_lights(camera), transmittance });
     }
     let mut lights = Vec::new();
     for (l, light) in run.project.shot.value.light.iter().enumerate().filter(|(_, l)| l.is_on(frame)) {
@@ -269,13 +270,13 @@ fn lights(
                 1 => None,
                 _ => Some(export::thickness(run, i)?.offsets),
             };
-            lit[i].push(match offsets {
+            transmittance[i].push(match offsets {
                 Some(offsets) => nth(&column, &offsets, drawn.every).collect(),
                 None => column,
             });
         }
     }
-    Ok((lights, lit))
+    Ok(Lit { lights, transmittance })
 }
 
 fn save(run: &mut Runner<'_>, what: What, name: &str, picture: &Image) -> Result<(), Error> {
