@@ -93,3 +93,19 @@ fn solids_beside_the_skin_cast_shadow() {
     let frames = frames(&shot);
     assert!(frames.iter().flatten().all(|l| l.transmittance[1].iter().all(|t| *t == 0.0)));
 }
+
+#[test]
+fn shadows_in_the_cache_can_be_inspected() {
+    let shot = lit_shot(COMMAND, 2);
+    shot.report(&[]);
+    let mut kinds = Vec::new();
+    for name in shot.entries().into_keys().filter(|n| n.ends_with("shadow.mcap")) {
+        let path = format!(".pelage-cache/v1/entries/{name}");
+        let found: serde_json::Value =
+            serde_json::from_str(&shot.succeed(&["inspect", &path, "--json"])).expect("JSON");
+        let mean = found["mean"].as_f64().expect("a mean");
+        assert!(mean > 0.1 && mean < 0.9 && found["layers"] == 2, "{found}");
+        kinds.push(found["kind"].as_str().expect("a kind").to_owned());
+    }
+    assert_eq!(kinds, ["transmittance of a light"; 3]);
+}

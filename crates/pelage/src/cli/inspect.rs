@@ -5,6 +5,7 @@ use crate::Error;
 use crate::curves::{self, CurveFile, signature};
 use crate::format::image::{self, Channel};
 use crate::format::{csv, mcap, ply};
+use crate::stage::shadow::decode;
 use pelage_geom::Topology;
 use serde_json::{Map, Value, json};
 use std::path::Path;
@@ -192,7 +193,15 @@ fn inspect_mcap(file: &Path) -> Result<Value, Error> {
     if let Ok(bytes) = std::fs::read(file)
         && let Ok(state) = mcap::read_state_payload(&bytes)
     {
-        return Ok(json!({"kind": "simulation state", "bytes": state.len()}));
+        let Some(columns) = decode(&state) else {
+            return Ok(json!({"kind": "simulation state", "bytes": state.len()}));
+        };
+        let points: usize = columns.iter().map(Vec::len).sum();
+        let sum: f64 = columns.iter().flatten().map(|t| f64::from(*t)).sum();
+        let mean = if points > 0 { sum / points as f64 } else { 1.0 };
+        return Ok(
+            json!({"kind": "transmittance of a light", "layers": columns.len(), "points": points, "mean": mean}),
+        );
     }
     let summary = mcap::inspect(file)?;
     Ok(json!({"kind": "MCAP", "content": format!("{summary:#?}")}))

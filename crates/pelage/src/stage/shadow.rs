@@ -167,7 +167,8 @@ fn encode(columns: &[Vec<f32>]) -> Vec<u8> {
     out
 }
 
-fn decode(bytes: &[u8]) -> Option<Vec<Vec<f32>>> {
+/// What [`encode`] wrote; `None` for anything else.
+pub fn decode(bytes: &[u8]) -> Option<Vec<Vec<f32>>> {
     let number = |b: &[u8]| Some(u64::from_le_bytes(b.get(..8)?.try_into().ok()?) as usize);
     let count = number(bytes)?;
     let mut at = count.checked_add(1)?.checked_mul(8)?;
