@@ -49,6 +49,11 @@ impl Offsets {
         self.0[i] as usize..self.0[i + 1] as usize
     }
 
+    /// The run that element `i`, less than the total, belongs to.
+    pub fn run_of(&self, i: usize) -> usize {
+        self.0[..self.len()].partition_point(|start| *start as usize <= i).saturating_sub(1)
+    }
+
     /// Length of the flat array.
     pub fn total(&self) -> usize {
         self.0[self.0.len() - 1] as usize

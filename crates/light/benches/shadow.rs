@@ -8,11 +8,11 @@
 #[path = "../tests/common/mod.rs"]
 mod common;
 
-use common::{BALL, Body, Groom, ball, curly, fur, long, score, some_points};
+use common::{BALL, Body, Groom, ball, curly, fur, long, some_points};
 use pelage_geom::Vec3;
 use pelage_light::shadow::{
-    Footprint, Interpolation, MEASURED, Placement, Quality, Sample, ShadowHair, ShadowSettings, Solid, Source,
-    transmittance, transmittance_exact,
+    Footprint, Interpolation, MEASURED, Placement, Quality, Sample, ShadowError, ShadowHair, ShadowSettings, Solid,
+    Source, transmittance, transmittance_exact,
 };
 use std::hint::black_box;
 use std::time::Instant;
@@ -78,7 +78,7 @@ fn row(name: &str, layers: &[ShadowHair], points: &[[usize; 2]], truth: &[Sample
     let start = Instant::now();
     let (light, counts) = transmittance(SOURCE, layers, &[], &settings).expect("light");
     let seconds = start.elapsed().as_secs_f64();
-    let [rms, p95, bias] = score(&light, points, truth);
+    let ShadowError { rms, p95, bias } = ShadowError::of(&light, points, truth);
     let ShadowSettings { texels, slices, placement, interpolation, filter } = settings;
     println!(
         "{name},{texels},{slices},{placement:?},{interpolation:?},1/{:.0},{rms:.4},{p95:.4},{bias:+.4},{seconds:.3},{:.1}",

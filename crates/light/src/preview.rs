@@ -109,13 +109,23 @@ const CHUNK: usize = 256;
 
 /// A point of a layer in scene space.
 pub(crate) fn in_layer(layer: &HairView, p: &[f32; 3]) -> Vec3 {
-    Vec3::new(layer.origin[0] + f64::from(p[0]), layer.origin[1] + f64::from(p[1]), layer.origin[2] + f64::from(p[2]))
+    in_scene(layer.origin, p)
+}
+
+/// A point that is stored relative to an origin.
+pub(crate) fn in_scene(origin: [f64; 3], p: &[f32; 3]) -> Vec3 {
+    Vec3::new(origin[0] + f64::from(p[0]), origin[1] + f64::from(p[1]), origin[2] + f64::from(p[2]))
+}
+
+/// Diameter at point `i`, finite and >= 0.
+pub(crate) fn diameter(width: &[f32], i: usize) -> f32 {
+    width.get(i).copied().filter(|w| *w > 0.0 && *w < 1e15).unwrap_or(0.0)
 }
 
 impl HairView<'_> {
     /// Diameter at point `i`, >= 0.
     pub(crate) fn width(&self, i: usize) -> f32 {
-        self.width.get(i).copied().filter(|w| *w > 0.0 && *w < 1e15).unwrap_or(0.0)
+        diameter(self.width, i)
     }
 
     /// Colour of strand `s` at its point `i` (counted over all strands). A strand has two points or more: more colours
@@ -177,7 +187,7 @@ impl Lighting {
         let lights = toward.iter().zip(scene.lights);
         let up = to_light(&Light { direction: camera.up.map(|v| -v), ..Light::default() });
         // Shadows on the skin of a light nearby are those of one far away beyond it.
-        let middle = middle(scene);
+        let middle = if scene.lights.iter().any(|l| l.position.is_some()) { middle(scene) } else { Vec3::zeros() };
         let far = |(t, l): (&Vec3, &Light)| {
             l.position.and_then(|p| (Vec3::from(p) - middle).try_normalize(0.0)).unwrap_or(*t)
         };

@@ -2,11 +2,11 @@
 
 mod common;
 
-use common::{BALL, Body, Groom, ball, curly, fur, long, score, some_points};
+use common::{BALL, Body, Groom, ball, curly, fur, long, some_points};
 use pelage_geom::{Offsets, Vec3, rng};
 use pelage_light::shadow::{
-    BadSource, Footprint, Interpolation, Placement, Quality, ShadowHair, ShadowSettings, Solid, Source, for_error,
-    transmittance, transmittance_exact,
+    BadSource, Footprint, Interpolation, Placement, Quality, ShadowError, ShadowHair, ShadowSettings, Solid, Source,
+    for_error, transmittance, transmittance_exact,
 };
 
 const DOWN: Source = Source::Directional { direction: Vec3::new(0.0, -1.0, 0.0) };
@@ -169,7 +169,7 @@ fn the_default_is_within_its_bars() {
         let points = some_points(&layers, 1500);
         let truth = transmittance_exact(SLANTED, &layers, &[], &FOOTPRINT, &points).expect("light");
         let light = map(SLANTED, &layers, &Quality::Default.settings());
-        let [rms, p95, bias] = score(&light, &points, &truth);
+        let ShadowError { rms, p95, bias } = ShadowError::of(&light, &points, &truth);
         println!("{name}: rms {rms:.4} p95 {p95:.4} bias {bias:+.4}");
         assert!(rms <= 0.02 && p95 <= 0.05 && bias.abs() <= 0.005, "{name}: {rms} {p95} {bias}");
     }
@@ -186,7 +186,7 @@ fn lights_near_and_inside_are_as_right_as_far_ones() {
     for source in [at(0.3, 0.6, 0.2), at(0.14, 0.16, 0.05), spot] {
         let truth = transmittance_exact(source, &layers, &[], &FOOTPRINT, &points).expect("light");
         let light = map(source, &layers, &Quality::Default.settings());
-        let [rms, _, bias] = score(&light, &points, &truth);
+        let ShadowError { rms, bias, .. } = ShadowError::of(&light, &points, &truth);
         println!("{source:?}: rms {rms:.4} bias {bias:+.4}");
         assert!(rms <= 0.02 && bias.abs() <= 0.005, "{source:?}: {rms} {bias}");
     }
@@ -211,7 +211,7 @@ fn error_falls_with_resolution_and_the_mean_stays() {
         let settings =
             ShadowSettings { texels, slices: texels / 4, placement: Placement::Uniform, ..Default::default() };
         let light = map(SLANTED, &layers, &settings);
-        let [rms, ..] = score(&light, &points, &truth);
+        let rms = ShadowError::of(&light, &points, &truth).rms;
         let all = mean(&light[0]);
         println!("{texels}: rms {rms:.4} mean {all:.4}");
         if let Some((r, m)) = before {

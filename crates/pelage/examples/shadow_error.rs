@@ -8,7 +8,7 @@
 use pelage::curves;
 use pelage_geom::{Vec3, rng};
 use pelage_light::shadow::{
-    Footprint, Placement, Quality, ShadowHair, ShadowSettings, Source, transmittance, transmittance_exact,
+    Footprint, Placement, Quality, ShadowError, ShadowHair, ShadowSettings, Source, transmittance, transmittance_exact,
 };
 use std::path::Path;
 use std::time::Instant;
@@ -70,13 +70,8 @@ fn main() {
         let start = Instant::now();
         let (found, counts) = transmittance(source, &hair, &[], &settings).expect("a light with a direction");
         let seconds = start.elapsed().as_secs_f64();
-        let mut error: Vec<f64> =
-            picked.iter().zip(&truth).map(|(p, t)| f64::from(found[p[0]][p[1]]) - t.mean).collect();
-        let bias = error.iter().sum::<f64>() / POINTS as f64;
-        let rms = (error.iter().map(|e| e * e).sum::<f64>() / POINTS as f64 - noise).max(0.0).sqrt();
-        error.iter_mut().for_each(|e| *e = e.abs());
-        error.sort_by(f64::total_cmp);
-        let (p95, mb) = (error[POINTS * 95 / 100], counts.bytes >> 20);
+        let ShadowError { rms, p95, bias } = ShadowError::of(&found, &picked, &truth);
+        let mb = counts.bytes >> 20;
         let mean = found.iter().flatten().map(|t| f64::from(*t)).sum::<f64>() / points as f64;
         let (texels, slices) = (counts.texels, settings.slices);
         println!(

@@ -1,6 +1,6 @@
 //! Segments sorted into the tiles they touch.
 
-use super::line::thickness;
+use super::line::{part_over, thickness};
 use super::project::{Place, Projection};
 use super::{ShadowHair, TILE};
 use rayon::prelude::*;
@@ -85,26 +85,9 @@ impl Segment {
     /// the rest of a long segment lies says nothing, and depths between its ends would be taken for slices between theirs.
     pub fn over(&self, side: f32) -> Option<Segment> {
         let (a, b, margin) = (self.a, self.b, 0.5 * self.width + 1.0);
-        let (mut from, mut to) = (0.0f32, 1.0f32);
-        for i in 0..2 {
-            let (low, high) = (a[i].min(b[i]), a[i].max(b[i]));
-            if low >= -margin && high <= side + margin {
-                continue;
-            }
-            if low > side + margin || high < -margin {
-                return None;
-            }
-            let inverse = 1.0 / (b[i] - a[i]);
-            let (u, v) = ((-margin - a[i]) * inverse, (side + margin - a[i]) * inverse);
-            from = from.max(u.min(v));
-            to = to.min(u.max(v));
-        }
+        let [from, to] = part_over(&a, &b, -margin, side + margin)?;
         let at = |t: f32| std::array::from_fn(|i| a[i] + (b[i] - a[i]) * t);
-        (from < to).then(|| Segment {
-            a: if from > 0.0 { at(from) } else { a },
-            b: if to < 1.0 { at(to) } else { b },
-            ..*self
-        })
+        Some(Segment { a: if from > 0.0 { at(from) } else { a }, b: if to < 1.0 { at(to) } else { b }, ..*self })
     }
 }
 
@@ -274,16 +257,7 @@ impl Tiles {
 /// The layer's strand that point `i` of layer `l` is on, in the numbers of [`Point::strand`].
 pub(crate) fn strand_of(layers: &[ShadowHair], l: usize, i: usize) -> u32 {
     let before: usize = layers[..l].iter().map(|l| l.offsets.len()).sum();
-    let (mut low, mut high) = (0, layers[l].offsets.len());
-    while high - low > 1 {
-        let middle = (low + high) / 2;
-        if layers[l].offsets.range(middle).start <= i {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    (before + low) as u32
+    (before + layers[l].offsets.run_of(i)) as u32
 }
 
 /// Puts points on the plane.

@@ -36,6 +36,34 @@ pub struct Sample {
     pub variance: f64,
 }
 
+/// How far maps are from the truth.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ShadowError {
+    /// Root mean square, the truth's own noise taken out in quadrature.
+    pub rms: f64,
+    /// 95th percentile of the size.
+    pub p95: f64,
+    /// Mean.
+    pub bias: f64,
+}
+
+impl ShadowError {
+    /// Of what [`super::transmittance`] gives, at points whose truth is known (one or more).
+    pub fn of(light: &[Vec<f32>], points: &[[usize; 2]], truth: &[Sample]) -> ShadowError {
+        let error: Vec<f64> = points.iter().zip(truth).map(|(&[l, i], t)| f64::from(light[l][i]) - t.mean).collect();
+        let n = error.len() as f64;
+        let noise = truth.iter().map(|t| t.variance).sum::<f64>() / n;
+        let square = error.iter().map(|e| e * e).sum::<f64>() / n;
+        let mut size: Vec<f64> = error.iter().map(|e| e.abs()).collect();
+        size.sort_by(f64::total_cmp);
+        ShadowError {
+            rms: (square - noise).max(0.0).sqrt(),
+            p95: size[size.len() * 95 / 100],
+            bias: error.iter().sum::<f64>() / n,
+        }
+    }
+}
+
 /// A segment in space.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Axis {

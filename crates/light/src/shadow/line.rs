@@ -47,6 +47,26 @@ pub(crate) fn thickness(width: f32, slant: f32, opacity: f32) -> f32 {
     }
 }
 
+/// First and last parameter of the part of a line from `a` to `b` that lies over the square [low, high)^2 of texels.
+#[inline]
+pub(crate) fn part_over(a: &[f32; 3], b: &[f32; 3], low: f32, high: f32) -> Option<[f32; 2]> {
+    let (mut from, mut to) = (0.0f32, 1.0f32);
+    for i in 0..2 {
+        let (least, most) = (a[i].min(b[i]), a[i].max(b[i]));
+        if least >= low && most < high {
+            continue;
+        }
+        if least >= high || most < low {
+            return None;
+        }
+        let inverse = 1.0 / (b[i] - a[i]);
+        let (u, v) = ((low - a[i]) * inverse, (high - a[i]) * inverse);
+        from = from.max(u.min(v));
+        to = to.min(u.max(v));
+    }
+    (from < to).then_some([from, to])
+}
+
 /// A line in a volume, cut where it passes from column to column of texels along the axis it mostly follows (from row to
 /// row where it mostly goes across rows): point `origin` + t `step` for t in [`from`, `to`], cut at whole t. Each part is
 /// deposited at its middle, so every column has its share exactly; deposits at equal distances from the line's end instead
@@ -112,21 +132,8 @@ impl Line {
     /// The part of a line that lies over the volume and before its last plane.
     #[inline]
     fn new(a: [f32; 3], b: [f32; 3], depth: f32, side: f32, slices: f32) -> Option<Line> {
-        let (mut from, mut to) = (0.0f32, 1.0f32);
-        for i in 0..2 {
-            let (low, high) = (a[i].min(b[i]), a[i].max(b[i]));
-            if low >= 0.0 && high < side {
-                continue;
-            }
-            if low >= side || high < 0.0 {
-                return None;
-            }
-            let inverse = 1.0 / (b[i] - a[i]);
-            let (u, v) = (-a[i] * inverse, (side - a[i]) * inverse);
-            from = from.max(u.min(v));
-            to = to.min(u.max(v));
-        }
-        if from >= to || a[2].min(b[2]) >= slices {
+        let [from, to] = part_over(&a, &b, 0.0, side)?;
+        if a[2].min(b[2]) >= slices {
             return None;
         }
         let part = to - from;

@@ -8,8 +8,7 @@
 //!
 //! A point's own hair is taken out of its footprint by the same deposits that put it in, so no bias in depth is needed.
 //! Solids are met by a ray from the point itself, so their shadows are sharp and exact (points that lie before all that
-//! a map sees of the solids there need no ray); only hair is averaged over the
-//! footprint, and the reference does the same.
+//! a map sees of the solids there need no ray); only hair is averaged over the footprint, and the reference does the same.
 //!
 //! Transmittance is the fraction of light that passes all *other* hairs and all solids: a hair of opacity o that lies
 //! across a ray multiplies by 1 - o. Falloff with distance and the shape of a spot's beam are not in it.
@@ -24,10 +23,11 @@ mod solid;
 mod tile;
 mod volume;
 
-pub use exact::{Footprint, Sample, transmittance_exact};
+pub use exact::{Footprint, Sample, ShadowError, transmittance_exact};
 pub use settings::{Interpolation, MEASURED, Measured, Placement, Quality, ShadowSettings, for_error};
 pub use solid::Solid;
 
+use crate::preview::{diameter, in_scene};
 use bins::{Chunk, chunks};
 use pelage_geom::{Offsets, Vec3};
 use project::{Projection, fit};
@@ -189,7 +189,7 @@ impl ShadowHair<'_> {
     /// Diameter at point `i`, finite and >= 0.
     #[inline]
     pub(crate) fn width(&self, i: usize) -> f32 {
-        self.width.get(i).copied().filter(|w| *w > 0.0 && *w < 1e15).unwrap_or(0.0)
+        diameter(self.width, i)
     }
 
     /// Opacity of strand `s` at its point `i` (counted over all strands), in [0, 1].
@@ -203,7 +203,6 @@ impl ShadowHair<'_> {
     /// Point `i` in scene space.
     #[inline]
     pub(crate) fn point(&self, i: usize) -> Vec3 {
-        let p = self.position[i];
-        Vec3::from(self.origin) + Vec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]))
+        in_scene(self.origin, &self.position[i])
     }
 }

@@ -2,11 +2,9 @@
 
 use super::settings::{ShadowSettings, WIDEST};
 use super::{BadSource, ShadowCounts, ShadowHair, Source};
+use crate::slab::HUGE;
 use pelage_geom::Vec3;
 use rayon::prelude::*;
-
-/// Coordinates beyond this count as not finite: their squares still fit single precision.
-const HUGE: f64 = 1e18;
 
 /// False for what is not finite or out of range.
 #[inline]

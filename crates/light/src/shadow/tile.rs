@@ -26,13 +26,14 @@ const SPLITS: u32 = 5;
 /// Slices that the middle of a segment may be off by: more puts hair before its neighbour that lies behind it.
 const STRAIGHT: f32 = 0.25;
 
-/// Hands out a segment in pieces whose depths, put into slices by `at` at their ends, are right between them too.
-fn straighten(s: Segment, at: &impl Fn(f32) -> f32, splits: u32, emit: &mut impl FnMut(Segment)) {
+/// Hands out a segment in pieces whose depths are right between their ends too when `at` puts them into slices; `a` and `b`
+/// are the slices of its own ends.
+fn straighten(s: Segment, [a, b]: [f32; 2], at: &impl Fn(f32) -> f32, splits: u32, emit: &mut impl FnMut(Segment)) {
     let middle: [f32; 3] = std::array::from_fn(|i| 0.5 * (s.a[i] + s.b[i]));
-    let (a, b) = (at(s.a[2]), at(s.b[2]));
-    if splits > 0 && (at(middle[2]) - 0.5 * (a + b)).abs() > STRAIGHT {
-        straighten(Segment { b: middle, ..s }, at, splits - 1, emit);
-        straighten(Segment { a: middle, ..s }, at, splits - 1, emit);
+    let m = at(middle[2]);
+    if splits > 0 && (m - 0.5 * (a + b)).abs() > STRAIGHT {
+        straighten(Segment { b: middle, ..s }, [a, m], at, splits - 1, emit);
+        straighten(Segment { a: middle, ..s }, [m, b], at, splits - 1, emit);
     } else {
         emit(Segment { a: [s.a[0], s.a[1], a], b: [s.b[0], s.b[1], b], ..s });
     }
@@ -48,7 +49,7 @@ pub(crate) struct Work<'a> {
     hidden: usize,
     volume: Volume,
     segment: Vec<Cast>,
-    /// Segments before they were cut where slices change their distances.
+    /// Room for segments while they are cut where slices change their distances.
     bent: Vec<Cast>,
     receiver: Vec<Receiver>,
     line: Vec<Line>,
@@ -228,7 +229,8 @@ impl<'a> Work<'a> {
         };
         self.bent.clear();
         for Cast { segment, strand } in &self.segment {
-            straighten(*segment, &at, SPLITS, &mut |segment| self.bent.push(Cast { segment, strand: *strand }));
+            let mut emit = |segment| self.bent.push(Cast { segment, strand: *strand });
+            straighten(*segment, [at(segment.a[2]), at(segment.b[2])], &at, SPLITS, &mut emit);
         }
         std::mem::swap(&mut self.segment, &mut self.bent);
         for r in &mut self.receiver {

@@ -149,14 +149,3 @@ pub fn some_points(layers: &[ShadowHair], count: usize) -> Vec<[usize; 2]> {
     out.dedup();
     out
 }
-
-/// Error of maps: root mean square without the truth's noise, 95th percentile of its size, mean.
-pub fn score(light: &[Vec<f32>], points: &[[usize; 2]], truth: &[pelage_light::shadow::Sample]) -> [f64; 3] {
-    let error: Vec<f64> = points.iter().zip(truth).map(|(&[l, i], t)| f64::from(light[l][i]) - t.mean).collect();
-    let n = error.len() as f64;
-    let noise = truth.iter().map(|t| t.variance).sum::<f64>() / n;
-    let square = error.iter().map(|e| e * e).sum::<f64>() / n;
-    let mut size: Vec<f64> = error.iter().map(|e| e.abs()).collect();
-    size.sort_by(f64::total_cmp);
-    [(square - noise).max(0.0).sqrt(), size[size.len() * 95 / 100], error.iter().sum::<f64>() / n]
-}

@@ -74,6 +74,15 @@ where
     Fixed::deserialize(d).map(|f| f.0)
 }
 
+/// Reads an array of exactly N values that may be left out.
+pub fn some_exactly<'de, D, T, const N: usize>(d: D) -> Result<Option<[T; N]>, D::Error>
+where
+    D: Deserializer<'de>,
+    T: Deserialize<'de>,
+{
+    exactly(d).map(Some)
+}
+
 /// A parsed file with its text, kept to point into.
 #[derive(Clone, Debug)]
 pub struct Document<T> {
@@ -118,6 +127,14 @@ impl<T: DeserializeOwned> Document<T> {
 }
 
 impl<T> Document<T> {
+    /// Complains about a number at a key that is not between two others.
+    pub(super) fn within(&self, key: &str, x: f64, low: f64, high: f64) -> Result<(), ConfigError> {
+        if (low..=high).contains(&x) {
+            return Ok(());
+        }
+        Err(self.error(key, format!("{x} is out of range"), format!("values go from {low} to {high}")))
+    }
+
     /// A complaint about the value at a key such as `layer[0].length.value`; points at the longest part of the key that
     /// the file has.
     pub fn error(&self, key: &str, what: impl Into<String>, help: impl Into<String>) -> ConfigError {

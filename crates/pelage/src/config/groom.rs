@@ -587,11 +587,4 @@ impl Document<GroomFile> {
             _ => Ok(()),
         }
     }
-
-    pub(super) fn within(&self, key: &str, x: f64, low: f64, high: f64) -> Result<(), ConfigError> {
-        if (low..=high).contains(&x) {
-            return Ok(());
-        }
-        Err(self.error(key, format!("{x} is out of range"), format!("values go from {low} to {high}")))
-    }
 }

@@ -1,10 +1,10 @@
 //! Lights of a shot, and how well their shadows are known: `[[light]]` and `[shadow]`.
 
-use super::document::{ConfigError, Document, exactly};
+use super::document::{ConfigError, Document, exactly, some_exactly};
 use super::keyed::{Keyed, Vector};
 use super::shot::ShotFile;
 use schemars::JsonSchema;
-use serde::{Deserialize, Deserializer};
+use serde::Deserialize;
 
 /// A light.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -30,7 +30,7 @@ pub struct Light {
     #[serde(default = "white", deserialize_with = "exactly")]
     pub color: [f64; 3],
     /// First and last frame at which it is on. Default: always.
-    #[serde(default, deserialize_with = "some_frames")]
+    #[serde(default, deserialize_with = "some_exactly")]
     pub frames: Option<[i32; 2]>,
     /// Write its column. Default: true. A light that no file and no picture uses costs nothing.
     #[serde(default = "yes")]
@@ -49,10 +49,6 @@ fn yes() -> bool {
     true
 }
 
-fn some_frames<'de, D: Deserializer<'de>>(d: D) -> Result<Option<[i32; 2]>, D::Error> {
-    exactly(d).map(Some)
-}
-
 /// What a light is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
@@ -66,6 +62,16 @@ pub enum LightKind {
 }
 
 impl Light {
+    /// Angle between a spot's axis and its border at a frame, degrees.
+    pub fn border(&self, frame: i32) -> f64 {
+        self.cone.as_ref().map_or(30.0, |c| c.at(f64::from(frame)))
+    }
+
+    /// Part of a spot's cone over which it fades.
+    pub fn fade(&self) -> f64 {
+        self.softness.unwrap_or(0.2)
+    }
+
     /// True if it is on at a frame.
     pub fn is_on(&self, frame: i32) -> bool {
         self.frames.is_none_or(|[a, b]| (a..=b).contains(&frame))
@@ -167,12 +173,12 @@ impl Document<ShotFile> {
             let Some(keyed) = keyed else { continue };
             let least = if key == "cone" { 0.01 } else { 0.0 };
             for k in &keyed.0 {
-                self.light_value(&format!("{at}.{key}"), k.value, least, most)?;
+                self.within(&format!("{at}.{key}"), k.value, least, most)?;
             }
             self.check_keys(&format!("{at}.{key}"), keyed)?;
         }
-        self.light_value(&format!("{at}.softness"), l.softness.unwrap_or(0.0), 0.0, 1.0)?;
-        l.color.iter().try_for_each(|c| self.light_value(&format!("{at}.color"), *c, 0.0, 1e6))?;
+        self.within(&format!("{at}.softness"), l.softness.unwrap_or(0.0), 0.0, 1.0)?;
+        l.color.iter().try_for_each(|c| self.within(&format!("{at}.color"), *c, 0.0, 1e6))?;
         if l.frames.is_some_and(|[a, b]| a > b) {
             return Err(self.error(&format!("{at}.frames"), "the last frame comes before the first", "first, last"));
         }
@@ -184,12 +190,5 @@ impl Document<ShotFile> {
             return Ok(());
         }
         Err(self.error(at, "key frames are not in order", "write one or more, each after the one before"))
-    }
-
-    fn light_value(&self, at: &str, x: f64, least: f64, most: f64) -> Result<(), ConfigError> {
-        if (least..=most).contains(&x) {
-            return Ok(());
-        }
-        Err(self.error(at, format!("{x} is out of range"), format!("from {least} to {most}")))
     }
 }

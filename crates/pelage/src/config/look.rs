@@ -1,7 +1,7 @@
 //! What displaces hairs after they are interpolated or simulated: `[[layer.clump]]`, `[layer.curl]`, `[[layer.wave]]`,
 //! `[[layer.noise]]`, `[layer.wind]`, `[layer.collision]` and `[[emitter]]` of the groom file.
 
-use super::document::{Fixed, exactly};
+use super::document::{Fixed, exactly, some_exactly};
 use super::keyed::{Keyed, Vector};
 use super::look_value::{LookValue, Varied, VariedValue, varied};
 use super::{Layer, MapRef};
@@ -472,7 +472,7 @@ pub struct Emitter {
     #[serde(default = "two_dozen")]
     pub rate: f64,
     /// First and last frame. Default: those of the shot.
-    #[serde(default, deserialize_with = "some_frames")]
+    #[serde(default, deserialize_with = "some_exactly")]
     pub frames: Option<[i32; 2]>,
     /// Names its random numbers. Default: 0.
     #[serde(default)]
@@ -497,10 +497,6 @@ fn always() -> Keyed<f64> {
 
 fn never() -> Keyed<f64> {
     Keyed::constant(0.0)
-}
-
-fn some_frames<'de, D: Deserializer<'de>>(d: D) -> Result<Option<[i32; 2]>, D::Error> {
-    exactly(d).map(Some)
 }
 
 impl Clump {

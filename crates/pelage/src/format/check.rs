@@ -87,7 +87,7 @@ impl ShotCheck {
                     return Err(bad(format!("layer {:?} {what}", shape.name)));
                 }
                 if let Some(i) = column.iter().position(|t| !(0.0..=1.0).contains(t)) {
-                    let hair = shape.id[curve_of(&shape.offsets, i)];
+                    let hair = shape.id[shape.offsets.run_of(i)];
                     return Err(bad(format!("layer {:?}, hair {hair}: a transmittance is {}", shape.name, column[i])));
                 }
             }
@@ -97,7 +97,7 @@ impl ShotCheck {
             };
             scan("velocity", data.velocity)?;
             if let Some(i) = data.width.iter().position(|w| !is_width(*w)) {
-                let hair = shape.id[curve_of(&shape.offsets, i)];
+                let hair = shape.id[shape.offsets.run_of(i)];
                 return Err(bad(format!("layer {:?}, hair {hair}: a width is {}", shape.name, data.width[i])));
             }
             if let Some(i) = data.opacity.iter().position(|x| !x.is_finite()) {
@@ -131,19 +131,9 @@ pub(super) fn is_width(w: f32) -> bool {
 /// Names the hair and the point of the first value that is not a number.
 fn not_finite(shape: &LayerShape, what: &str, values: &[[f32; 3]]) -> String {
     let point = values.iter().position(|v| v.iter().any(|x| !x.is_finite())).unwrap_or(0);
-    let hair = curve_of(&shape.offsets, point);
+    let hair = shape.offsets.run_of(point);
     let along = point - shape.offsets.range(hair).start;
     format!("layer {:?}, hair {}: {what} of point {along} is {:?}", shape.name, shape.id[hair], values[point])
-}
-
-/// The curve that point `v` belongs to; `v` must be less than the total.
-fn curve_of(offsets: &Offsets, v: usize) -> usize {
-    let (mut lo, mut hi) = (0, offsets.len());
-    while hi - lo > 1 {
-        let mid = (lo + hi) / 2;
-        if offsets.range(mid).start <= v { lo = mid } else { hi = mid }
-    }
-    lo
 }
 
 fn check_facts(path: &Path, facts: &ShotFacts) -> Result<(), FormatError> {
@@ -212,15 +202,15 @@ fn check_layer(path: &Path, layer: &HairLayer) -> Result<(), FormatError> {
         }
     }
     if let Some(i) = layer.color.iter().position(|c| c.iter().any(|x| !x.is_finite())) {
-        let hair = if layer.color_per_point() { curve_of(&layer.offsets, i) } else { i };
+        let hair = if layer.color_per_point() { layer.offsets.run_of(i) } else { i };
         return bad(format!("hair {}: a colour is {:?}", layer.id[hair], layer.color[i]));
     }
     if let Some(i) = layer.rest.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
-        let hair = curve_of(&layer.offsets, i);
+        let hair = layer.offsets.run_of(i);
         return bad(format!("hair {}: a point of the rest pose is {:?}", layer.id[hair], layer.rest[i]));
     }
     match layer.width.iter().position(|w| !is_width(*w)) {
-        Some(i) => bad(format!("hair {}: a width is {}", layer.id[curve_of(&layer.offsets, i)], layer.width[i])),
+        Some(i) => bad(format!("hair {}: a width is {}", layer.id[layer.offsets.run_of(i)], layer.width[i])),
         None => Ok(()),
     }
 }
@@ -323,6 +313,21 @@ pub(super) mod samples {
     pub(crate) fn light(layer: &HairLayer, frame: i32) -> Vec<Vec<f32>> {
         let of = |c: usize| (0..layer.width.len()).map(|i| ((i + 3 * c + frame as usize) % 9) as f32 * 0.125).collect();
         (0..3).map(of).collect()
+    }
+
+    /// Hands the frames of the lit shot to a writer, one after another.
+    pub(crate) fn write_lit(mut write: impl FnMut(i32, &[HairFrame])) {
+        let (facts, layers) = lit();
+        for &number in &facts.frames {
+            let data: Vec<_> = layers.iter().map(|l| (frame(l, number), light(l, number))).collect();
+            let frames = data.iter().map(|((position, velocity), transmittance)| HairFrame {
+                position,
+                velocity,
+                transmittance,
+                ..HairFrame::default()
+            });
+            write(number, &frames.collect::<Vec<_>>());
+        }
     }
 
     /// Diameters and opacities of `layer` at `frame`, other than the layer's.

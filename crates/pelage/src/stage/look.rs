@@ -24,6 +24,7 @@ use pelage_groom::look::wave::{Axis, RootVariable, Shape, Stations, Waves, root_
 use pelage_groom::look::wind::{Wind, wind};
 use pelage_groom::look::{Param, perlin};
 use pelage_sim::body::Closed;
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
@@ -108,12 +109,13 @@ pub fn finish(
     Ok(out)
 }
 
-/// A skin with its holes closed, and the structure over its rest pose.
+/// A skin with its holes closed, and the hierarchy over its rest pose.
 #[derive(Debug)]
 pub struct Barrier {
     /// The mesh.
     pub closed: Closed,
-    rest: Bvh,
+    /// Made when hairs are first pushed.
+    rest: OnceCell<Bvh>,
 }
 
 /// The skin with its holes closed.
@@ -123,8 +125,7 @@ pub fn barrier(run: &mut Runner<'_>) -> Result<Rc<Barrier>, Error> {
     }
     let skin = groom::skin(run)?;
     let closed = Closed::new(&skin.mesh, &skin.topology);
-    let rest = closed.bvh(&closed.extend(&skin.mesh.position));
-    Ok(run.barrier.insert(Rc::new(Barrier { closed, rest })).clone())
+    Ok(run.barrier.insert(Rc::new(Barrier { closed, rest: OnceCell::new() })).clone())
 }
 
 /// Pushes finished hairs out of the skin, to the side that they came `from` before they were displaced.
@@ -138,12 +139,14 @@ fn collide(
     counts: &mut Counts,
 ) -> Result<(), Error> {
     let (skin, barrier) = (groom::skin(run)?, barrier(run)?);
+    let hierarchy = |position: &[[f64; 3]]| barrier.closed.bvh(&barrier.closed.extend(position));
+    let rest = || barrier.rest.get_or_init(|| hierarchy(&skin.mesh.position));
     let posed;
     let (bvh, motion) = match at {
-        SkinAt::Rest => (&barrier.rest, None),
-        SkinAt::Rigid(t) => (&barrier.rest, Some(t)),
+        SkinAt::Rest => (rest(), None),
+        SkinAt::Rigid(t) => (rest(), Some(t)),
         SkinAt::File(_) => {
-            posed = barrier.closed.bvh(&barrier.closed.extend(&pose.position));
+            posed = hierarchy(&pose.position);
             (&posed, None)
         }
     };

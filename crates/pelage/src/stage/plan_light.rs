@@ -3,7 +3,7 @@
 use super::Stage;
 use super::plan::{Plan, Reader, What, version};
 use crate::cache::Recipe;
-use crate::config::{Light, LightKind, Shadow, ShadowQuality};
+use crate::config::{Keyed, Light, LightKind, Shadow, ShadowQuality, Vector};
 use crate::project::{Project, SkinAt};
 use pelage_geom::Vec3;
 use pelage_light::shadow::{Quality, ShadowSettings, Source, for_error};
@@ -40,16 +40,14 @@ pub fn settings(shadow: &Shadow) -> Option<ShadowSettings> {
 /// A light at a frame.
 pub fn source(light: &Light, frame: i32) -> Source {
     let at = f64::from(frame);
-    let vector = |v: &Option<crate::config::Keyed<crate::config::Vector>>| {
-        Vec3::from(v.as_ref().map_or([0.0; 3], |v| v.vectors().at(at)))
-    };
+    let vector = |v: &Option<Keyed<Vector>>| Vec3::from(v.as_ref().map_or([0.0; 3], |v| v.vectors().at(at)));
     let (direction, position) = (vector(&light.direction), vector(&light.position));
     match light.kind {
         LightKind::Directional => Source::Directional { direction },
         LightKind::Point => Source::Point { position },
         LightKind::Spot => {
-            let border = light.cone.as_ref().map_or(30.0, |c| c.at(at)).to_radians();
-            let soft = border * light.softness.unwrap_or(0.2);
+            let border = light.border(frame).to_radians();
+            let soft = border * light.fade();
             Source::Spot { position, direction, cone: border - soft, softness: soft }
         }
     }
@@ -93,8 +91,8 @@ impl Reader<'_> {
             r = v.iter().fold(r, |r, v| r.param(name, format!("{:?}", v.vectors().at(moment)), key(name)));
         }
         if light.kind == LightKind::Spot {
-            r = r.param("cone", light.cone.as_ref().map_or(30.0, |c| c.at(moment)), key("cone"));
-            r = r.param("softness", light.softness.unwrap_or(0.2), key("softness"));
+            r = r.param("cone", light.border(frame), key("cone"));
+            r = r.param("softness", light.fade(), key("softness"));
         }
         let how = match settings(&project.shot.value.shadow) {
             None => "rays".to_owned(),

@@ -97,19 +97,19 @@ pub fn sheet(run: &mut Runner<'_>) -> Result<(), Error> {
     save(run, What::Sheet, "sheet.png", &contact_sheet(&pictures, columns))
 }
 
-/// Layers to draw, and which hairs of them: every n-th.
+/// Layers to draw, and which hairs of them: every n-th of `all`.
 struct Drawn {
     layers: Vec<HairLayer>,
+    all: Vec<Offsets>,
     every: usize,
 }
 
 /// Layers of a run whose project has `percent` of the shot's hairs.
 fn drawn(run: &mut Runner<'_>, percent: f64) -> Result<Drawn, Error> {
     let count = run.project.groom.value.layer.len();
-    let mut hairs = 0;
-    for i in 0..count {
-        hairs += export::look(run, i)?.offsets.len();
-    }
+    let offsets = |i: usize| Ok(export::thickness(run, i)?.offsets);
+    let all = (0..count).map(offsets).collect::<Result<Vec<Offsets>, Error>>()?;
+    let hairs: usize = all.iter().map(Offsets::len).sum();
     // Curves are not thinned yet, grooms are.
     let least = if run.project.curves.is_some() { (100.0 / percent).round() as usize } else { 1 };
     let every = hairs.div_ceil(DRAWN).max(least).max(1);
@@ -117,7 +117,7 @@ fn drawn(run: &mut Runner<'_>, percent: f64) -> Result<Drawn, Error> {
     let layer = |i: usize| Ok(thinned(export::look(run, i)?, every, 1.0 / share[i] as f32));
     let layers = (0..count).map(layer).collect::<Result<_, Error>>()?;
     run.layers.clear();
-    Ok(Drawn { layers, every })
+    Ok(Drawn { layers, all, every })
 }
 
 /// Every n-th hair, n times as wide, and `wider` times that.
@@ -149,8 +149,7 @@ fn hairs(run: &mut Runner<'_>, drawn: &Drawn, i: usize, frame: i32) -> Result<Di
     if drawn.every == 1 {
         return Ok(all);
     }
-    let offsets = export::look(run, i)?.offsets;
-    let position = nth(&all.position, &offsets, drawn.every).collect();
+    let position = nth(&all.position, &drawn.all[i], drawn.every).collect();
     Ok(Displaced { position, wet: all.wet.into_iter().step_by(drawn.every).collect() })
 }
 
@@ -266,13 +265,9 @@ fn lights(run: &mut Runner<'_>, drawn: &Drawn, camera: &Camera, frame: i32) -> R
             },
         });
         for (i, column) in shadow::columns(run, l, frame)?.into_iter().enumerate() {
-            let offsets = match drawn.every {
-                1 => None,
-                _ => Some(export::thickness(run, i)?.offsets),
-            };
-            transmittance[i].push(match offsets {
-                Some(offsets) => nth(&column, &offsets, drawn.every).collect(),
-                None => column,
+            transmittance[i].push(match drawn.every {
+                1 => column,
+                every => nth(&column, &drawn.all[i], every).collect(),
             });
         }
     }

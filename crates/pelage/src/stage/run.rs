@@ -71,8 +71,9 @@ pub struct Runner<'a> {
     pub(super) barrier: Option<Rc<super::look::Barrier>>,
     /// Particles of emitters that have a file.
     pub(super) particles: BTreeMap<usize, Rc<Vec<pelage_groom::areas::Particle>>>,
-    /// Solids at the frame whose shadows were made last.
-    pub(super) solids: Option<(i32, Rc<Vec<super::shadow::Shade>>)>,
+    /// What stands in the light at the frame whose shadows were made last.
+    pub(super) scene: Option<(i32, Rc<super::shadow::Scene>)>,
+    pub(super) props: Option<Rc<Vec<super::shadow::Prop>>>,
     pub(super) hits: Option<(i32, Rc<super::areas::Hits>)>,
     pub(super) placed: Option<pelage_groom::control::ControlHairs>,
     pub(super) control: Option<Rc<pelage_groom::control::ControlHairs>>,
@@ -116,7 +117,8 @@ impl<'a> Runner<'a> {
             looks: BTreeMap::new(),
             barrier: None,
             particles: BTreeMap::new(),
-            solids: None,
+            scene: None,
+            props: None,
             hits: None,
             placed: None,
             control: None,
@@ -189,6 +191,7 @@ impl<'a> Runner<'a> {
         self.sites.clear();
         self.members.clear();
         self.looks.clear();
+        self.scene = None;
     }
 
     /// Scene-space point that positions are relative to.

@@ -6,8 +6,8 @@ use super::{What, export, groom, interpolate, look};
 use crate::Error;
 use crate::config::Light;
 use crate::format::mcap::{read_state_payload, write_state_payload};
-use crate::format::ply;
-use crate::project::SkinAt;
+use crate::format::{HairLayer, ply};
+use crate::project::{BodyFile, SkinAt};
 use pelage_geom::{Bvh, Topology, Vec3};
 use pelage_light::shadow::{Footprint, ShadowHair, ShadowSettings, Solid, Source, transmittance, transmittance_exact};
 use pelage_sim::body::Closed;
@@ -19,12 +19,27 @@ const RAYS: usize = 64;
 /// The file of a step's payload.
 const FILE: &str = "shadow.mcap";
 
+/// What stands in the light at a frame, whatever light it is.
+#[derive(Debug)]
+pub struct Scene {
+    /// Hairs by layer: how thick and opaque they are, and where.
+    hairs: Vec<(HairLayer, Vec<[f32; 3]>)>,
+    solids: Vec<Shade>,
+}
+
 /// A solid that stands in the light.
 #[derive(Debug)]
-pub struct Shade {
+struct Shade {
     position: Vec<[f64; 3]>,
     triangle: Vec<[u32; 3]>,
     bvh: Bvh,
+}
+
+/// A mesh beside the skin, its holes closed.
+#[derive(Debug)]
+pub struct Prop {
+    rest: Vec<[f64; 3]>,
+    closed: Closed,
 }
 
 /// Transmittance of light `l` at a frame: a value for each point of each layer, in [0, 1].
@@ -37,28 +52,14 @@ pub fn columns(run: &mut Runner<'_>, l: usize, frame: i32) -> Result<Vec<Vec<f32
     }
     let (light, origin) = (&run.project.shot.value.light[l], run.origin()?);
     let from = source(light, frame);
-    let count = run.project.groom.value.layer.len();
-    let mut hairs = Vec::new();
-    for i in 0..count {
-        let mut thickness = export::thickness(run, i)?;
-        let hair = interpolate::hairs(run, What::Frame(i, frame))?;
-        let (width, opacity) = hair.wet_columns(Some(&thickness));
-        if !hair.wet.is_empty() {
-            (thickness.width, thickness.opacity) = (width, opacity);
-        }
-        let wider = 1.0 / run.project.share[i] as f32;
-        if wider != 1.0 {
-            thickness.width.iter_mut().for_each(|w| *w *= wider);
-        }
-        hairs.push((thickness, hair.position));
-    }
-    let solids = solids(run, frame)?;
-    let layers: Vec<ShadowHair<'_>> = hairs
+    let scene = scene(run, frame)?;
+    let layers: Vec<ShadowHair<'_>> = scene
+        .hairs
         .iter()
         .map(|(l, position)| ShadowHair { offsets: &l.offsets, position, origin, width: &l.width, opacity: &l.opacity })
         .collect();
     let solid: Vec<Solid<'_>> =
-        solids.iter().map(|s| Solid { position: &s.position, triangle: &s.triangle, bvh: &s.bvh }).collect();
+        scene.solids.iter().map(|s| Solid { position: &s.position, triangle: &s.triangle, bvh: &s.bvh }).collect();
     let mut counts = Counts::new();
     let made = match settings(&run.project.shot.value.shadow) {
         Some(settings) => transmittance(from, &layers, &solid, &settings).map(|(columns, found)| {
@@ -128,11 +129,32 @@ fn by_rays(
     Ok(layers.iter().map(column).collect())
 }
 
-/// Skin and other meshes at a frame, holes closed.
-fn solids(run: &mut Runner<'_>, frame: i32) -> Result<Rc<Vec<Shade>>, Error> {
-    if let Some((_, found)) = run.solids.as_ref().filter(|(of, _)| *of == frame) {
+/// What stands in the light at a frame, made once for all lights.
+fn scene(run: &mut Runner<'_>, frame: i32) -> Result<Rc<Scene>, Error> {
+    if let Some((_, found)) = run.scene.as_ref().filter(|(of, _)| *of == frame) {
         return Ok(found.clone());
     }
+    let mut hairs = Vec::new();
+    for i in 0..run.project.groom.value.layer.len() {
+        let mut thickness = export::thickness(run, i)?;
+        let hair = interpolate::hairs(run, What::Frame(i, frame))?;
+        let (width, opacity) = hair.wet_columns(Some(&thickness));
+        if !hair.wet.is_empty() {
+            (thickness.width, thickness.opacity) = (width, opacity);
+        }
+        let wider = 1.0 / run.project.share[i] as f32;
+        if wider != 1.0 {
+            thickness.width.iter_mut().for_each(|w| *w *= wider);
+        }
+        hairs.push((thickness, hair.position));
+    }
+    let found = Rc::new(Scene { hairs, solids: solids(run, frame)? });
+    run.scene = Some((frame, found.clone()));
+    Ok(found)
+}
+
+/// Skin and other meshes at a frame, holes closed.
+fn solids(run: &mut Runner<'_>, frame: i32) -> Result<Vec<Shade>, Error> {
     let mut out = Vec::new();
     let mut add = |closed: &Closed, position: &[[f64; 3]]| {
         let position = closed.extend(position);
@@ -144,19 +166,30 @@ fn solids(run: &mut Runner<'_>, frame: i32) -> Result<Rc<Vec<Shade>>, Error> {
         let pose = groom::pose(run, &at)?;
         add(&look::barrier(run)?.closed, &pose.position);
     }
-    for body in &run.project.bodies {
+    for (prop, body) in props(run)?.iter().zip(&run.project.bodies) {
+        match body.motion.as_ref().map(|m| m.at(f64::from(frame))) {
+            Some(t) => {
+                let moved: Vec<[f64; 3]> = prop.rest.iter().map(|p| t.apply(Vec3::from(*p)).into()).collect();
+                add(&prop.closed, &moved);
+            }
+            None => add(&prop.closed, &prop.rest),
+        }
+    }
+    Ok(out)
+}
+
+/// The meshes beside the skin, read once a run.
+fn props(run: &mut Runner<'_>) -> Result<Rc<Vec<Prop>>, Error> {
+    if let Some(found) = &run.props {
+        return Ok(found.clone());
+    }
+    let read = |body: &BodyFile| {
         let mesh = ply::read_mesh(&body.file.path)?.mesh;
         let closed = Closed::new(&mesh, &Topology::new(&mesh));
-        let motion = body.motion.as_ref().map(|m| m.at(f64::from(frame)));
-        let moved: Vec<[f64; 3]> = match motion {
-            Some(t) => mesh.position.iter().map(|p| t.apply(Vec3::from(*p)).into()).collect(),
-            None => mesh.position.clone(),
-        };
-        add(&closed, &moved);
-    }
-    let out = Rc::new(out);
-    run.solids = Some((frame, out.clone()));
-    Ok(out)
+        Ok(Prop { rest: mesh.position, closed })
+    };
+    let found = run.project.bodies.iter().map(read).collect::<Result<Vec<_>, Error>>()?;
+    Ok(run.props.insert(Rc::new(found)).clone())
 }
 
 /// Columns one after another: their number, their lengths, their values.

@@ -139,7 +139,7 @@ impl HairMcap {
         })?;
         if let Some(place) = look {
             let points = frame.position.len();
-            let columns = if self.facts.lights.is_empty() { 0 } else { 1 + self.facts.lights.len() };
+            let columns = self.facts.shadow_columns().len();
             let look = self.message(layer, place, &format!("look of frame {number}"), |sequence, message| {
                 let look = proto::decode_look(message)?;
                 let sized = look.width.is_empty() || look.width.len() == points;
@@ -464,19 +464,7 @@ mod tests {
         let (facts, layers) = samples::lit();
         let path = dir.path().join("a.mcap");
         let mut out = McapHair::create(&path, &facts, &layers).unwrap();
-        for &frame in &facts.frames {
-            let data: Vec<_> = layers.iter().map(|l| (samples::frame(l, frame), samples::light(l, frame))).collect();
-            let data: Vec<_> = data
-                .iter()
-                .map(|((position, velocity), transmittance)| HairFrame {
-                    position,
-                    velocity,
-                    transmittance,
-                    ..HairFrame::default()
-                })
-                .collect();
-            out.write_frame(frame, &data).unwrap();
-        }
+        samples::write_lit(|frame, data| out.write_frame(frame, data).unwrap());
         out.finish().unwrap();
         verify_layers(&path, &facts, &layers).unwrap();
         verify_frames(&path, &facts, &sizes(&layers)).unwrap();

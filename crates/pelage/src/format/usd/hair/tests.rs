@@ -127,19 +127,7 @@ fn transmittance_has_a_column_for_every_light_and_one_for_all() {
     let (facts, layers) = samples::lit();
     let path = dir.path().join("a.usdc");
     let mut out = UsdHair::create(&path, &facts, &layers).unwrap();
-    for &frame in &facts.frames {
-        let data: Vec<_> = layers.iter().map(|l| (samples::frame(l, frame), samples::light(l, frame))).collect();
-        let data: Vec<_> = data
-            .iter()
-            .map(|((position, velocity), transmittance)| HairFrame {
-                position,
-                velocity,
-                transmittance,
-                ..HairFrame::default()
-            })
-            .collect();
-        out.write_frame(frame, &data).unwrap();
-    }
+    samples::write_lit(|frame, data| out.write_frame(frame, data).unwrap());
     out.finish().unwrap();
     verify(&path, &facts, &layers).unwrap();
     let dark = ShotFacts { lights: vec!["key".into(), "other".into()], ..facts.clone() };
