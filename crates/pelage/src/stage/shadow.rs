@@ -200,7 +200,7 @@ fn encode(columns: &[Vec<f32>]) -> Vec<u8> {
     out
 }
 
-/// What [`encode`] wrote; `None` for anything else.
+/// Columns from the bytes of a step; `None` for anything else.
 pub fn decode(bytes: &[u8]) -> Option<Vec<Vec<f32>>> {
     let number = |b: &[u8]| Some(u64::from_le_bytes(b.get(..8)?.try_into().ok()?) as usize);
     let count = number(bytes)?;
