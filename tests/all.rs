@@ -9,6 +9,7 @@ mod golden;
 mod light;
 mod look;
 mod look_page;
+mod pictures;
 mod reference;
 mod rows;
 mod samples;

@@ -122,7 +122,12 @@ pub fn files_below(folder: &Path) -> BTreeMap<String, Vec<u8>> {
                 folders.push(path);
             } else {
                 let name = path.strip_prefix(folder).expect("below the folder").to_string_lossy().into_owned();
-                found.insert(name, std::fs::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display())));
+                match std::fs::read(&path) {
+                    Ok(bytes) => drop(found.insert(name, bytes)),
+                    // A command that is still at work takes its own away.
+                    Err(e) if e.kind() == std::io::ErrorKind::NotFound => {}
+                    Err(e) => panic!("{}: {e}", path.display()),
+                }
             }
         }
     }

@@ -366,6 +366,14 @@ fn preview_settings() {
     shot.edit(SHOT, "sheet = 2", "sheet = 3\nzoom = 2.0\nframe = 3");
     let why = ["pipeline.toml: preview.zoom 1 -> 2", "pipeline.toml: preview.frame 2 -> 3"];
     expect(&shot, &["preview/still"], &why);
+    shot.edit(SHOT, "zoom = 2.0\nframe = 3", "exposure = 1.0\nshade = { fur = 0.5 }\nzoom = 2.0\nframe = 3");
+    let why = ["pipeline.toml: preview.exposure 0 -> 1", "pipeline.toml: preview.shade.fur 0.8 -> 0.5"];
+    expect(&shot, &["preview/still"], &why);
+    shot.edit(SHOT, "zoom = 2.0", "camera = { eye = [0, 0, 30], target = [0, 0, 0] }");
+    let added = ["eye", "target", "up", "fov"].map(|key| format!("pipeline.toml: preview.camera.{key} added"));
+    let gone = ["from", "zoom"].map(|key| format!("pipeline.toml: preview.{key} taken out"));
+    let why: Vec<&str> = added.iter().chain(&gone).map(String::as_str).collect();
+    expect(&shot, &["preview/still"], &why);
 }
 
 #[test]

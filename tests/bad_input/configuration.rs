@@ -140,6 +140,35 @@ fn values_out_of_range_in_the_shot() {
         ("sheet = 2", "zoom = 0", "preview.zoom|help:"),
         ("sheet = 2", "zoom = nan", "preview.zoom|help:"),
         ("sheet = 2", "from = [0, 0, 0]", "preview.from|help:"),
+        ("sheet = 2", "turntable = 0", "preview.turntable|1 and 1000"),
+        ("sheet = 2", "exposure = nan", "preview.exposure|NaN is out of range"),
+        ("sheet = 2", "depth_cue = 1", "preview.depth_cue|1 is out of range"),
+        ("sheet = 2", "tone = \"film\"", "unknown variant `film`"),
+        ("sheet = 2", "shade = { fur = 2 }", "preview.shade.fur|2 is out of range"),
+        ("sheet = 2", "shade = { gloss = 2 }", "unknown field `gloss`"),
+        ("sheet = 2", "camera = { eye = [0, 0, 9] }", "missing field `target`"),
+        (
+            "sheet = 2",
+            "camera = { eye = [0, 0, 9], target = [0, 0, 9] }",
+            "preview.camera.eye|where the target is|help:",
+        ),
+        ("sheet = 2", "camera = { eye = [0, 0, nan], target = [0, 0, 0] }", "preview.camera.eye|finite|help:"),
+        (
+            "sheet = 2",
+            "camera = { eye = [0, 0, 9], target = [0, 0, 0], fov = 180 }",
+            "preview.camera.fov|180 is out of range",
+        ),
+        (
+            "sheet = 2",
+            "camera = { eye = [0, 0, 9], target = [0, 0, 0], up = [0, 0, 0] }",
+            "preview.camera.up|direction",
+        ),
+        ("sheet = 2", "zoom = 2\ncamera = { eye = [0, 0, 9], target = [0, 0, 0] }", "preview.zoom|is not read|help:"),
+        (
+            "sheet = 2",
+            "from = [0, 0, 1]\ncamera = { eye = [0, 0, 9], target = [0, 0, 0] }",
+            "preview.from|is not read|help:",
+        ),
     ] {
         corpus.refuse_edit(SHOT, from, to, &format!("pipeline.toml, line|{words}"));
     }

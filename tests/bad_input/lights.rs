@@ -34,6 +34,7 @@ fn lights() {
         ("kind = \"directional\"\ndirection = [0, -1, 0]\ncolor = [1, 1, -1]", ".color|-1 is out of range"),
         ("kind = \"directional\"\ndirection = [0, -1, 0]\nframes = [3, 2]", ".frames|before the first"),
         ("kind = \"directional\"\ndirection = [0, -1, 0]\nfalloff = 2", "unknown field `falloff`"),
+        ("kind = \"directional\"\ndirection = [0, -1, 0]\nwrap = 91", ".wrap|91 is out of range"),
         (
             "kind = \"spot\"\nposition = [0, 9, 0]\ndirection = [0, -1, 0]\ncone = 0",
             ".cone|0 is out of range|from 0.01 to 90",
@@ -49,6 +50,7 @@ fn lights() {
         ("\"draft\"", "\"best\"", "unknown variant `best`"),
         ("\"draft\"", "\"draft\"\nerror = 0.1", "shadow.error|beside `quality`|help:"),
         ("quality = \"draft\"", "error = 0", "shadow.error|0 is out of range|help:"),
+        ("quality = \"draft\"", "shorten = 1", "shadow.shorten|1 is out of range|help:"),
     ] {
         corpus.refuse_edit(SHOT, from, to, &format!("pipeline.toml, line|{words}"));
     }

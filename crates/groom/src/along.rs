@@ -36,8 +36,8 @@ pub(crate) fn at_points(profile: &[f32], points: usize) -> Vec<f32> {
     if profile.is_empty() { Vec::new() } else { (0..points).map(|k| value(profile, fraction(k, points))).collect() }
 }
 
-/// \[V\] diameters and \[C\] opacities of hairs with factors on both for each hair; opacities stay within 0 and 1.
-pub fn scaled(offsets: &Offsets, width: &[f32], opacity: &[f32], factor: &[[f32; 2]]) -> (Vec<f32>, Vec<f32>) {
+/// \[V\] diameters and \[C\] opacities of hairs with factors on both for each hair (a third number is not read); opacities stay within 0 and 1.
+pub fn scaled(offsets: &Offsets, width: &[f32], opacity: &[f32], factor: &[[f32; 3]]) -> (Vec<f32>, Vec<f32>) {
     let mut wide = Vec::with_capacity(width.len());
     for (h, f) in factor.iter().enumerate() {
         wide.extend(width[offsets.range(h)].iter().map(|w| w * f[0]));

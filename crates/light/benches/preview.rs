@@ -46,6 +46,8 @@ fn measure(hairs: usize, points: usize) {
         color: &[],
         opacity: &[],
         root_normal: &normal,
+        shine: &[],
+        side: &[],
         transmittance: &[],
     }];
     let (vertex, triangle) = ball(120);

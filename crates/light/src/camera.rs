@@ -99,6 +99,36 @@ impl Camera {
         }
     }
 
+    /// Frames points that are looked at from all sides: from `turns` places on a circle about the upright line through their
+    /// middle, of which `direction` says the first. Returns the camera there and a point of the line.
+    pub fn frame_turning(
+        points: &[[f64; 3]],
+        direction: [f64; 3],
+        up: [f64; 3],
+        aspect: f64,
+        turns: u32,
+    ) -> (Camera, [f64; 3]) {
+        let finite = || points.iter().filter(|p| p.iter().all(|v| v.is_finite()));
+        let (low, high) = finite().fold((Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY)), |(l, h), p| {
+            let p = Vec3::from(*p);
+            (l.inf(&p), h.sup(&p))
+        });
+        let axis = if low.x <= high.x { (low + high) * 0.5 } else { Vec3::zeros() };
+        let turn = |k: u32| turn(Vec3::from(up), std::f64::consts::TAU * f64::from(k) / f64::from(turns.max(1)));
+        let turned = (0..turns.max(1)).flat_map(|k| {
+            let turn = turn(k);
+            finite().map(move |p| (axis + turn * (Vec3::from(*p) - axis)).into())
+        });
+        (Camera::frame_points(turned, direction, up, aspect), axis.into())
+    }
+
+    /// The camera on its way round an upright line through a point, by an angle in radians.
+    pub fn turned(&self, axis: [f64; 3], up: [f64; 3], angle: f64) -> Camera {
+        let (axis, turn) = (Vec3::from(axis), turn(Vec3::from(up), angle));
+        let at = |p: [f64; 3]| (axis + turn * (Vec3::from(p) - axis)).into();
+        Camera { eye: at(self.eye), target: at(self.target), up: (turn * Vec3::from(self.up)).into(), ..*self }
+    }
+
     /// The same view about the same middle, `by` times as large: a longer lens from the same place.
     pub fn zoomed(&self, by: f64) -> Camera {
         let by = if by > 0.0 && by.is_finite() { by } else { 1.0 };
@@ -157,6 +187,14 @@ impl View {
     }
 }
 
+/// Rotation by an angle about a direction, which need not be unit (Rodrigues' formula); none about no direction.
+fn turn(up: Vec3, angle: f64) -> nalgebra::Matrix3<f64> {
+    let Some(n) = unit(up) else { return nalgebra::Matrix3::identity() };
+    let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+    let cross = n.cross_matrix();
+    nalgebra::Matrix3::identity() + cross * sin + cross * cross * (1.0 - cos)
+}
+
 /// Right, down, forward; any of them made up where the input has none.
 fn axes(forward: Vec3, up: Vec3) -> [Vec3; 3] {
     let f = unit(forward).unwrap_or(-Vec3::z());
@@ -208,6 +246,26 @@ mod tests {
             }
             assert_eq!(camera.zoomed(f64::NAN), camera.zoomed(1.0));
         }
+    }
+
+    #[test]
+    fn a_turntable_sees_everything_from_every_side() {
+        let points: Vec<[f64; 3]> =
+            (0..40).map(|k| [f64::from(k % 7), f64::from(k % 5) * 0.3, f64::from(k) * 0.1]).collect();
+        let (camera, axis) = Camera::frame_turning(&points, [0.2, -0.3, -1.0], [0.0, 1.0, 0.0], 1.5, 12);
+        let mut reach: f64 = 0.0;
+        for k in 0..12 {
+            let turned = camera.turned(axis, [0.0, 1.0, 0.0], std::f64::consts::TAU * f64::from(k) / 12.0);
+            let view = turned.view(300, 200);
+            assert!((turned.eye[1] - camera.eye[1]).abs() < 1e-12);
+            for p in &points {
+                let [x, y, _] = view.project(Vec3::from(*p)).expect("in front of the camera");
+                reach = reach.max((x / 150.0 - 1.0).abs()).max((y / 100.0 - 1.0).abs());
+            }
+        }
+        assert!((reach - (1.0 - FRAME_MARGIN)).abs() < 1e-9, "{reach}");
+        let nothing = Camera::frame_turning(&[], [0.0; 3], [0.0; 3], 1.0, 0);
+        assert!(nothing.0.eye.iter().all(|v| v.is_finite()));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use crate::preview::{HairView, Lighting, Region, in_layer};
 use crate::raster::{Point, REACH, TILE};
+use crate::shade::HairPoint;
 use crate::slab::HUGE;
 use crate::{V3, View};
 use std::ops::Range;
@@ -110,6 +111,8 @@ pub(crate) struct Draw<'a> {
     pub view: &'a View,
     pub lighting: &'a Lighting,
     pub tiling: Tiling,
+    /// Factor of widths at depth 0, and its change by depth.
+    pub cue: [f32; 2],
 }
 
 /// Buffers that are used again for each strand.
@@ -135,7 +138,8 @@ impl Draw<'_> {
                 }
                 let scale = self.view.scale(p.z.max(self.view.near)) as f32;
                 let color = layer.color(s, i);
-                let knot = Knot { p: p.cast(), m: V3::zeros(), width: layer.width(i), color, scale, index: i };
+                let width = layer.width(i) * (self.cue[0] + self.cue[1] * p.z as f32).clamp(0.0, 1.0);
+                let knot = Knot { p: p.cast(), m: V3::zeros(), width, color, scale, index: i };
                 let end = i + 1 == last;
                 let close = scratch.knot.last().is_some_and(|k| (knot.p - k.p).norm() * scale < MERGE);
                 if !close || end {
@@ -171,12 +175,18 @@ impl Draw<'_> {
             return;
         }
         let normal = layer.root_normal(s).map(|n| self.view.turn(n).cast());
+        let shine = layer.shine(s);
+        let side = |k: &Knot| match layer.side {
+            [] => V3::zeros(),
+            _ => self.view.turn(layer.side(k.index).cast()).cast(),
+        };
         let mut depth = vec![0.0; lights];
         let mut previous: Option<(Point, bool)> = None;
         for (k, w) in knot.windows(2).enumerate() {
             let (a, b) = (&w[0], &w[1]);
             let h = (b.p - a.p).norm();
             let n = pieces(a, b, h);
+            let sides = [side(a), side(b)];
             for j in usize::from(k > 0)..=n {
                 let u = j as f32 / n as f32;
                 let (p, t) = hermite(a, b, h, u);
@@ -185,7 +195,9 @@ impl Draw<'_> {
                     *d = d0 + (d1 - d0) * u;
                 }
                 let color = a.color + (b.color - a.color) * u;
-                let rgb = self.lighting.hair(p, t, color, normal, &depth);
+                let side = sides[0] + (sides[1] - sides[0]) * u;
+                let at = HairPoint { position: p, tangent: t, color, normal, shine, side };
+                let rgb = self.lighting.hair(&at, &depth);
                 let point =
                     Point { width: a.width + (b.width - a.width) * u, rgb: rgb.into(), strand, ..Point::default() };
                 let point = Point { x: p.x, y: p.y, z: p.z, ..point };

@@ -1,5 +1,6 @@
-//! Pictures in memory: tone curve, contact sheets, frame numbers.
+//! Pictures in memory: tone curve, contact sheets, text.
 
+use font8x8::legacy::BASIC_LEGACY;
 use rayon::prelude::*;
 
 /// A picture, linear, top row first.
@@ -16,23 +17,44 @@ pub struct Image {
 /// Where the shoulder of the tone curve begins, linear. Lower greys whole highlights, higher clips them hard.
 const SHOULDER: f32 = 0.55;
 
+/// Side of a letter, dots.
+pub(crate) const LETTER: usize = 8;
+
+/// How linear light becomes the values of a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Tone {
+    /// Straight up to a shoulder, then towards 1 without reaching it: highlights keep their shape.
+    #[default]
+    Shoulder,
+    /// Straight up to 1, where it is cut off: for values that are to be read.
+    Straight,
+}
+
 impl Image {
     /// A picture of one colour.
     pub fn filled(width: usize, height: usize, rgb: [f32; 3]) -> Image {
         Image { width, height, rgb: vec![rgb; width * height] }
     }
 
-    /// `height` rows of `width` pixels of 3 bytes, as a PNG or PPM file wants them: tone curve (straight up to a
-    /// shoulder, then towards 1 without reaching it), then the transfer curve of sRGB (IEC 61966-2-1).
-    pub fn to_srgb8(&self) -> Vec<u8> {
+    /// `height` rows of `width` pixels of 3 bytes, as a PNG or PPM file wants them: tone curve, then the transfer curve
+    /// of sRGB (IEC 61966-2-1).
+    pub fn to_srgb8(&self, tone: Tone) -> Vec<u8> {
         let mut bytes = vec![0u8; self.rgb.len() * 3];
         let step = srgb_steps();
         bytes.par_chunks_mut(3 * 4096).zip(self.rgb.par_chunks(4096)).for_each(|(out, rgb)| {
             for (o, &c) in out.iter_mut().zip(rgb.iter().flatten()) {
-                *o = step.partition_point(|s| *s <= tone(c)) as u8;
+                let c = if tone == Tone::Shoulder { shoulder(c) } else { c };
+                *o = step.partition_point(|s| *s <= c) as u8;
             }
         });
         bytes
+    }
+
+    /// The picture `stops` brighter: light times 2^stops.
+    pub fn exposed(mut self, stops: f32) -> Image {
+        let gain = libm::exp2f(stops);
+        self.rgb.par_iter_mut().for_each(|c| *c = c.map(|v| v * gain));
+        self
     }
 
     /// The picture at `1 / n` of its size: means of squares of `n` x `n` pixels; rows and columns left over are dropped.
@@ -51,38 +73,40 @@ impl Image {
         image
     }
 
-    /// Writes a whole number into the lower left corner: light digits of 5 x 7 dots with a dark rim, each dot `scale`
-    /// pixels wide. What does not fit is cut off.
-    pub fn draw_number(&mut self, number: i64, scale: usize) {
-        let text = number.to_string();
+    /// Writes text with its upper left corner at (x, y): light letters of 8 x 8 dots with a dark rim, each dot `scale`
+    /// pixels wide. What does not fit is cut off; what is not ASCII is a question mark.
+    pub fn draw_text(&mut self, text: &str, [x0, y0]: [i64; 2], scale: usize) {
+        let s = scale.max(1) as i64;
+        let glyph = |c: char| BASIC_LEGACY[if c.is_ascii() { c as usize } else { '?' as usize }];
         let dots: Vec<(i64, i64)> = text
-            .bytes()
+            .chars()
             .enumerate()
             .flat_map(|(k, c)| {
-                let glyph = glyph(c);
-                (0..35).filter(move |d| glyph[d / 5] >> (4 - d % 5) & 1 == 1).map(move |d| (k * 6 + d % 5, d / 5))
+                let set = (0..LETTER * LETTER).filter(move |d| glyph(c)[d / LETTER] >> (d % LETTER) & 1 == 1);
+                set.map(move |d| ((k * LETTER + d % LETTER) as i64, (d / LETTER) as i64))
             })
-            .map(|(x, y)| (x as i64, y as i64))
             .collect();
-        let s = scale.max(1) as i64;
-        let (x0, y0) = (2 * s, self.height as i64 - 9 * s);
         for (rim, grey) in [((s + 1) / 2, 0.01), (0, 0.9)] {
             for &(x, y) in &dots {
-                for j in y * s - rim..(y + 1) * s + rim {
-                    for i in x * s - rim..(x + 1) * s + rim {
-                        let (px, py) = (x0 + i, y0 + j);
-                        if (0..self.width as i64).contains(&px) && (0..self.height as i64).contains(&py) {
-                            self.rgb[py as usize * self.width + px as usize] = [grey; 3];
-                        }
-                    }
-                }
+                self.fill([x * s + x0 - rim, y * s + y0 - rim], [s + 2 * rim; 2], [grey; 3]);
             }
+        }
+    }
+
+    /// Fills a rectangle with its upper left corner at `low`, as far as it lies in the picture.
+    pub(crate) fn fill(&mut self, low: [i64; 2], size: [i64; 2], rgb: [f32; 3]) {
+        let within = |i: usize, n: usize| {
+            let to = |v: i64| v.clamp(0, n as i64) as usize;
+            to(low[i])..to(low[i].saturating_add(size[i]))
+        };
+        for y in within(1, self.height) {
+            self.rgb[y * self.width..][within(0, self.width)].fill(rgb);
         }
     }
 }
 
 /// Straight up to the shoulder, then a hyperbola of the same slope that tends to 1.
-fn tone(x: f32) -> f32 {
+fn shoulder(x: f32) -> f32 {
     if x.is_nan() || x <= SHOULDER {
         return x.max(0.0);
     }
@@ -130,34 +154,22 @@ pub fn contact_sheet(images: &[Image], columns: usize) -> Image {
     sheet
 }
 
-/// 5 x 7 dots of a digit or a minus sign, a row a byte, the leftmost dot in bit 4.
-fn glyph(c: u8) -> [u8; 7] {
-    match c {
-        b'0' => [0x0e, 0x11, 0x13, 0x15, 0x19, 0x11, 0x0e],
-        b'1' => [0x04, 0x0c, 0x04, 0x04, 0x04, 0x04, 0x0e],
-        b'2' => [0x0e, 0x11, 0x01, 0x06, 0x08, 0x10, 0x1f],
-        b'3' => [0x0e, 0x11, 0x01, 0x06, 0x01, 0x11, 0x0e],
-        b'4' => [0x02, 0x06, 0x0a, 0x12, 0x1f, 0x02, 0x02],
-        b'5' => [0x1f, 0x10, 0x1e, 0x01, 0x01, 0x11, 0x0e],
-        b'6' => [0x06, 0x08, 0x10, 0x1e, 0x11, 0x11, 0x0e],
-        b'7' => [0x1f, 0x01, 0x02, 0x04, 0x08, 0x08, 0x08],
-        b'8' => [0x0e, 0x11, 0x11, 0x0e, 0x11, 0x11, 0x0e],
-        b'9' => [0x0e, 0x11, 0x11, 0x0f, 0x01, 0x02, 0x0c],
-        _ => [0, 0, 0, 0x0e, 0, 0, 0],
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn eight_bit_values_survive_below_the_shoulder() {
-        let grey = |c: f32| Image::filled(1, 1, [c; 3]).to_srgb8()[1];
+        let grey = |c: f32| Image::filled(1, 1, [c; 3]).to_srgb8(Tone::Shoulder)[1];
         assert!((0..=190u8).all(|v| grey(linear(v)) == v));
         let rising: Vec<u8> = (0..100).map(|i| grey(i as f32 * 0.05)).collect();
         assert!(rising.windows(2).all(|w| w[0] <= w[1]) && rising[99] > 240);
         assert_eq!([grey(f32::INFINITY), grey(-1.0), grey(f32::NAN)], [255, 0, 0]);
+        let straight = |c: f32| Image::filled(1, 1, [c; 3]).to_srgb8(Tone::Straight)[1];
+        assert!((0..=255u8).all(|v| straight(linear(v)) == v));
+        assert_eq!([straight(f32::INFINITY), straight(-1.0), straight(7.0)], [255, 0, 255]);
+        let twice = Image::filled(2, 1, [0.1, 0.2, 0.3]).exposed(1.0);
+        assert_eq!(twice.rgb, [[0.2, 0.4, 0.6]; 2]);
     }
 
     #[test]
@@ -184,14 +196,16 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_drawn_inside_the_picture_only() {
-        let mut image = Image::filled(70, 30, [0.3; 3]);
-        image.draw_number(-1007, 2);
+    fn text_is_drawn_inside_the_picture_only() {
+        let mut image = Image::filled(90, 30, [0.3; 3]);
+        image.draw_text("-1a,", [3, 4], 2);
         let light = image.rgb.iter().filter(|c| c[0] == 0.9).count();
-        // Dots of '-', '1', '0', '0', '7' at 2 x 2 pixels each.
-        let dots: u32 = b"-1007".iter().flat_map(|&c| glyph(c)).map(u8::count_ones).sum();
+        let dots: u32 = b"-1a,".iter().flat_map(|&c| BASIC_LEGACY[usize::from(c)]).map(u8::count_ones).sum();
         assert_eq!(light as u32, dots * 4);
-        Image::filled(3, 2, [0.0; 3]).draw_number(i64::MIN, 9);
-        Image::default().draw_number(1, 1);
+        // The middle column of a 1 is one stroke from top to bottom.
+        let column = (0..7).all(|y| image.rgb[(4 + 2 * y) * 90 + 3 + 2 * (8 + 3)] == [0.9; 3]);
+        assert!(column);
+        Image::filled(3, 2, [0.0; 3]).draw_text("µ9\u{1F600}", [-5, i64::MAX - 99], 9);
+        Image::default().draw_text("1", [0, 0], 1);
     }
 }

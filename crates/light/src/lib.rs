@@ -6,18 +6,21 @@
 
 pub mod camera;
 mod hair;
+pub mod heat;
 pub mod image;
 pub mod preview;
 mod raster;
 pub mod shade;
 pub mod shadow;
+mod shorten;
 mod skin_map;
 mod slab;
 
 pub use camera::{Camera, View};
-pub use image::{Image, contact_sheet};
+pub use image::{Image, Tone, contact_sheet};
 pub use preview::{HairView, Region, RenderCounts, Scene, Settings, SkinView, render, render_region};
 pub use shade::{HairShade, Light, studio_lights};
+pub use shorten::shortened;
 
 /// A point or direction in camera space, single precision: relative to the eye, so exact near it.
 pub(crate) type V3 = nalgebra::Vector3<f32>;

@@ -6,7 +6,7 @@
 
 use crate::hair::{Chunk, Draw, Scratch, Tiling};
 use crate::raster::{Facet, Filter, Point, TILE, Tile};
-use crate::shade::{HairModel, LightDir, fade, to_light};
+use crate::shade::{HairModel, HairPoint, LightDir, fade, to_light};
 use crate::slab::{HUGE, Slabs};
 use crate::{Camera, HairShade, Image, Light, V3, View};
 use pelage_geom::{Offsets, Vec3};
@@ -43,6 +43,12 @@ pub struct HairView<'a> {
     pub opacity: &'a [f32],
     /// Unit normal of the skin at the root, one a strand (default none: shading by the hair's direction alone).
     pub root_normal: &'a [[f32; 3]],
+    /// Factor of the highlights, one a strand, >= 0 (default 1): guard hairs, wet hair.
+    pub shine: &'a [f32],
+    /// How far out on its clump a point lies, and which way in scene space: 0 in the middle to 1 in length, one a point
+    /// (default 0). What is turned to a light is brighter by that much, what is turned away darker: the production
+    /// pipeline's shading of wet fur (§4.4).
+    pub side: &'a [[f32; 3]],
     /// For each light of the scene the part that arrives, one a point, in [0, 1], past hair and skin; empty: a cue by
     /// coarse slabs instead.
     pub transmittance: &'a [Vec<f32>],
@@ -70,11 +76,14 @@ pub struct Settings {
     pub ambient: [f32; 3],
     /// Factor of the optical depth of hair in the shadow cue; 0 for none, 1 for what the widths say.
     pub shadow: f32,
+    /// Part of its width that the farthest hair loses, the others by their depth, in [0, 1): a cue for depth beyond that
+    /// of perspective.
+    pub depth_cue: f32,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings { hair: HairShade::default(), ambient: [0.18, 0.19, 0.21], shadow: 0.9 }
+        Settings { hair: HairShade::default(), ambient: [0.18, 0.19, 0.21], shadow: 0.9, depth_cue: 0.0 }
     }
 }
 
@@ -139,6 +148,15 @@ impl HairView<'_> {
         not_nan(self.opacity.get(s).copied().unwrap_or(1.0).clamp(0.0, 1.0))
     }
 
+    pub(crate) fn shine(&self, s: usize) -> f32 {
+        not_nan(self.shine.get(s).copied().unwrap_or(1.0).clamp(0.0, 1e3))
+    }
+
+    pub(crate) fn side(&self, i: usize) -> V3 {
+        let side = V3::from(self.side.get(i).copied().unwrap_or_default()).map(not_nan);
+        side / side.norm().max(1.0)
+    }
+
     pub(crate) fn root_normal(&self, s: usize) -> Option<Vec3> {
         let n = Vec3::from(self.root_normal.get(s)?.map(f64::from));
         (n.norm_squared() > 0.25 && n.norm_squared() < 4.0).then(|| n.normalize())
@@ -170,6 +188,22 @@ fn middle(scene: &Scene) -> Vec3 {
     if low.x <= high.x { (low + high) * 0.5 } else { Vec3::zeros() }
 }
 
+/// Width of hair by its depth: factor at depth 0, and its change by depth. It is 1 at the nearest hair before the camera
+/// and `1 - strength` at the farthest.
+fn cue(scene: &Scene, view: &View, strength: f32) -> [f32; 2] {
+    if !(strength > 0.0) {
+        return [1.0, 0.0];
+    }
+    let none = [f32::INFINITY, f32::NEG_INFINITY];
+    let join = |a: [f32; 2], b: [f32; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+    let depth = |layer: &HairView, p: &[f32; 3]| view.to_camera(in_layer(layer, p)).z;
+    let seen = |z: f64| if z >= view.near && z < HUGE { [z as f32; 2] } else { none };
+    let of = |l: &HairView| l.position.par_iter().map(|p| seen(depth(l, p))).reduce(|| none, join);
+    let [near, far] = scene.layers.iter().map(of).fold(none, join);
+    let per = strength.min(0.999) / (far - near);
+    if per.is_finite() && per > 0.0 { [1.0 + per * near, -per] } else { [1.0, 0.0] }
+}
+
 /// Lights in camera space with their shadow cues.
 pub(crate) struct Lighting {
     lights: Vec<LightDir>,
@@ -199,6 +233,7 @@ impl Lighting {
                     color: V3::from(l.color),
                     position: l.position.map(|p| view.to_camera(Vec3::from(p)).cast()),
                     cone: l.cone.map(|c| c.map(|a| libm::cos(a) as f32)),
+                    wrap: libm::sin(l.wrap.clamp(0.0, std::f64::consts::FRAC_PI_2)) as f32,
                 })
                 .collect(),
             slabs: far.par_iter().map(|t| Slabs::new(scene, *t, view)).collect(),
@@ -246,15 +281,16 @@ impl Lighting {
         DEEP + (1.0 - DEEP) * if depth.is_empty() { 1.0 } else { open / self.lights.len() as f32 }
     }
 
-    /// Colour of a hair at a point of camera space with unit `tangent`.
-    pub fn hair(&self, p: V3, tangent: V3, color: V3, normal: Option<V3>, depth: &[f32]) -> V3 {
+    /// Colour of a hair at a point where `depth` is as from [`Lighting::depths`].
+    pub fn hair(&self, at: &HairPoint, depth: &[f32]) -> V3 {
+        let (p, color) = (at.position, at.color);
         let eye = self.eye(p);
         let ambient = V3::from(self.settings.ambient).component_mul(&color) * self.ambient(depth);
         let mut sum = ambient;
         for (light, d) in self.lights.iter().zip(depth.chunks_exact(2)) {
             let through = color.map(|c| fade(d[0] * (1.0 - SCATTER * c)) * d[1]);
             let (toward, beam) = light.toward(p);
-            let sent = self.model.reflect(tangent, eye, toward, normal, color) * beam;
+            let sent = self.model.reflect(at, eye, toward, light.wrap) * (beam * (1.0 + at.side.dot(&toward)));
             sum += sent.component_mul(&light.color).component_mul(&through);
         }
         sum
@@ -313,7 +349,7 @@ pub fn render_region(
     let tiling = Tiling::new(width, height, &region);
     let lighting = Lighting::new(scene, camera, &view, settings);
     let (facets, facet_bins) = facets(scene, &view, &tiling, &mut counts);
-    let draw = Draw { view: &view, lighting: &lighting, tiling };
+    let draw = Draw { view: &view, lighting: &lighting, tiling, cue: cue(scene, &view, settings.depth_cue) };
     let (points, opacity, mut lines) = lines(scene, &draw, &mut counts);
     let filter = Filter::new();
     let tiles = tiling.count();

@@ -15,6 +15,9 @@ pub struct Light {
     pub position: Option<[f64; 3]>,
     /// Half angles of the full beam and of its border, radians; `None`: to all sides.
     pub cone: Option<[f64; 2]>,
+    /// Angle beyond a right angle, radians, up to which it lights hair that takes the shading of the skin: the production
+    /// pipeline's falloff angle of a light (§4.4), by which a light from behind reaches round the body.
+    pub wrap: f64,
 }
 
 /// Key from above left, fill from the right, rim from behind: three lights that move with the camera.
@@ -85,6 +88,8 @@ pub(crate) struct LightDir {
     pub position: Option<V3>,
     /// Cosines of the full beam and of its border.
     pub cone: Option<[f32; 2]>,
+    /// Sine of the angle beyond a right angle up to which it lights hair.
+    pub wrap: f32,
 }
 
 impl LightDir {
@@ -100,6 +105,22 @@ impl LightDir {
             if full > border { ((cos - border) / (full - border)).clamp(0.0, 1.0) } else { f32::from(cos >= border) };
         (t, x * x * (3.0 - 2.0 * x))
     }
+}
+
+/// A point of a hair as the shading wants it: camera space.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct HairPoint {
+    pub position: V3,
+    /// Unit, from root to tip.
+    pub tangent: V3,
+    /// Linear.
+    pub color: V3,
+    /// Unit normal of the skin at the root.
+    pub normal: Option<V3>,
+    /// Factor of the highlights.
+    pub shine: f32,
+    /// How far out on its clump it is, and which way: from 0 in the middle to 1 in length.
+    pub side: V3,
 }
 
 /// Constants of [`HairShade`], worked out once.
@@ -156,8 +177,10 @@ impl HairModel {
     /// `light` unit and away from the hair, `normal` that of the skin at the root. With T, L, V for those:
     /// diffuse sin(T, L), highlight max(0, sin(T, L) sin(T, V) - (T.L)(T.V))^p, whose base is -cos of the sum of both
     /// angles, so that a shift of the highlight is a shift of that sum.
-    pub fn reflect(&self, tangent: V3, eye: V3, light: V3, normal: Option<V3>, color: V3) -> V3 {
-        let s = &self.shade;
+    /// The highlights are `shine` times as strong; the shading of the skin falls off to 0 at a right angle and `wrap` (a
+    /// sine) beyond.
+    pub fn reflect(&self, at: &HairPoint, eye: V3, light: V3, wrap: f32) -> V3 {
+        let (s, HairPoint { tangent, normal, color, shine, .. }) = (&self.shade, *at);
         let (tl, tv) = (tangent.dot(&light), tangent.dot(&eye));
         let (sl, sv) = ((1.0 - tl * tl).max(0.0).sqrt(), (1.0 - tv * tv).max(0.0).sqrt());
         // Light and eye on the same side of the hair (1) or on opposite sides (-1), seen along the hair.
@@ -167,11 +190,12 @@ impl HairModel {
         let mut diffuse = sl * lit;
         if let Some(n) = normal {
             let m = s.skin_normal * tangent.dot(&n).abs().min(1.0);
-            diffuse += (n.dot(&light).max(0.0) - diffuse) * m;
+            let facing = ((n.dot(&light) + wrap) / (1.0 + wrap)).max(0.0);
+            diffuse += (facing - diffuse) * m;
         }
         let (cos, sin) = (sl * sv - tl * tv, sl * tv + tl * sv);
-        let first = s.specular * front * self.first.value(cos, sin);
-        let second = s.glint * lit * self.second.value(cos, sin);
+        let first = shine * s.specular * front * self.first.value(cos, sin);
+        let second = shine * s.glint * lit * self.second.value(cos, sin);
         color * (s.diffuse * diffuse + second) + V3::repeat(first)
     }
 }
@@ -206,6 +230,27 @@ mod tests {
         })
     }
 
+    /// A point of a hair without a colour of its own.
+    fn black(tangent: V3) -> HairPoint {
+        let zero = V3::zeros();
+        HairPoint { position: zero, tangent, color: zero, normal: None, shine: 1.0, side: zero }
+    }
+
+    #[test]
+    fn light_wraps_as_far_as_its_angle() {
+        let model = HairModel::new(HairShade { skin_normal: 1.0, specular: 0.0, glint: 0.0, ..HairShade::default() });
+        // A hair that stands up has the shading of the skin alone.
+        let at = HairPoint { normal: Some(V3::z()), color: V3::repeat(1.0), ..black(V3::z()) };
+        let lit = |degrees: f64, wrap: f64| {
+            let a = degrees.to_radians();
+            let light = V3::new(libm::sin(a) as f32, 0.0, libm::cos(a) as f32);
+            model.reflect(&at, V3::x(), light, libm::sin(wrap.to_radians()) as f32).x
+        };
+        assert!(lit(89.0, 0.0) > 0.0 && lit(91.0, 0.0) == 0.0);
+        assert!(lit(119.0, 30.0) > 0.0 && lit(121.0, 30.0) == 0.0);
+        assert_eq!(lit(0.0, 0.0), lit(0.0, 30.0));
+    }
+
     #[test]
     fn the_highlight_peaks_on_the_mirror_cone() {
         let model = plain(60);
@@ -215,7 +260,7 @@ mod tests {
         for k in 0..=1800 {
             let a = f64::from(k) * 0.1_f64.to_radians();
             let eye = V3::new(libm::cos(a) as f32, libm::sin(a) as f32, 0.0);
-            let v = model.reflect(tangent, eye, light, None, V3::zeros()).x;
+            let v = model.reflect(&black(tangent), eye, light, 0.0).x;
             if v > best {
                 (best, at) = (v, a);
             }
@@ -232,7 +277,7 @@ mod tests {
             model.first = Lobe::new(shift, 80);
             let value = |a: f64| {
                 let t = V3::new(libm::cos(a.to_radians()) as f32, libm::sin(a.to_radians()) as f32, 0.0);
-                model.reflect(t, V3::x(), V3::x(), None, V3::zeros()).x
+                model.reflect(&black(t), V3::x(), V3::x(), 0.0).x
             };
             (500..=1300).map(|k| f64::from(k) * 0.1).fold(50.0, |b, a| if value(a) > value(b) { a } else { b })
         };
@@ -249,7 +294,8 @@ mod tests {
             for e in dirs {
                 for l in dirs {
                     for n in [None, Some(V3::z()), Some(-V3::z())] {
-                        let c = model.reflect(t, e, l, n, V3::new(0.3, 0.2, 0.1));
+                        let at = HairPoint { normal: n, color: V3::new(0.3, 0.2, 0.1), ..black(t) };
+                        let c = model.reflect(&at, e, l, 0.5);
                         assert!(c.iter().all(|v| v.is_finite() && *v >= 0.0), "{t} {e} {l}: {c}");
                     }
                 }

@@ -236,6 +236,8 @@ mod tests {
             color: &[],
             opacity: &vec![opacity; n],
             root_normal: &[],
+            shine: &[],
+            side: &[],
             transmittance: &[],
         }];
         let scene = Scene { skin: None, layers: &layers, lights: &[], background: [0.0; 3] };

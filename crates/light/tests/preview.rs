@@ -31,6 +31,8 @@ impl Hairs {
             color: &self.color,
             opacity: &self.opacity,
             root_normal: &[],
+            shine: &[],
+            side: &[],
             transmittance: &[],
         }
     }
@@ -186,7 +188,7 @@ fn the_same_bytes_for_any_number_of_threads() {
     let one = draw(1);
     assert_eq!(one, draw(2));
     assert_eq!(one, draw(5));
-    assert_eq!(one.to_srgb8(), draw(3).to_srgb8());
+    assert_eq!(one.to_srgb8(Tone::Shoulder), draw(3).to_srgb8(Tone::Shoulder));
 }
 
 #[test]
@@ -387,6 +389,8 @@ fn bad_input_is_counted_and_passed_over() {
         color: &[[f32::NAN, 2.0, -1.0]],
         opacity: &[f32::NAN, 7.0],
         root_normal: &[[0.0; 3], [f32::NAN; 3]],
+        shine: &[],
+        side: &[],
         transmittance: &[],
     };
     let vertex = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [f64::NAN, 0.0, 0.0], [2.0, 0.0, 0.0]];
@@ -419,6 +423,8 @@ fn hair_through_the_eye_is_cut_at_the_near_plane() {
         color: &hairs.color,
         opacity: &[],
         root_normal: &[],
+        shine: &[],
+        side: &[],
         transmittance: &[],
     };
     let camera = Camera { parallel_height: None, ..flat_camera() };
@@ -430,4 +436,44 @@ fn hair_through_the_eye_is_cut_at_the_near_plane() {
     let wide = 160.0 * 0.5 * camera.view(160, 130).scale(100.0) as f32;
     assert!((sum[1] / wide - 1.0).abs() < 0.25, "{} instead of {wide}", sum[1]);
     assert!(counts.pieces < 200, "{counts:?}");
+}
+
+#[test]
+fn highlights_grow_with_shine_and_sides_follow_the_light() {
+    let mut hairs = Hairs::default();
+    hairs.add(&[[-60.0, 0.0, 0.0], [60.0, 0.0, 0.0]], 8.0, [0.3; 3], 1.0);
+    let offsets = Offsets::uniform(1, 2);
+    let light = [Light { direction: [0.0, -0.6, -0.8], color: [1.0; 3], ..Light::default() }];
+    let settings = Settings { ambient: [0.0; 3], shadow: 0.0, ..Settings::default() };
+    let bright = |shine: &[f32], side: &[[f32; 3]]| {
+        let layers = [HairView { shine, side, ..hairs.view(&offsets) }];
+        let scene = Scene { skin: None, layers: &layers, lights: &light, background: [0.0; 3] };
+        render(&scene, &flat_camera(), 160, 130, &settings).0.rgb[65 * 160 + 80][0]
+    };
+    let plain = bright(&[], &[]);
+    assert_eq!((bright(&[1.0], &[[0.0; 3]; 2]), bright(&[f32::NAN], &[[f32::NAN; 3]; 2]) < plain), (plain, true));
+    assert!(bright(&[3.0], &[]) > 1.2 * plain && bright(&[0.0], &[]) < 0.9 * plain);
+    // Half way out towards the light is half as bright again, half way out from it half as bright.
+    for (out, factor) in [(0.5, 1.5), (-0.5, 0.5)] {
+        let side = [[0.0, 0.6 * out, 0.8 * out]; 2];
+        assert!((bright(&[], &side) / plain - factor).abs() < 1e-4, "{out}");
+    }
+}
+
+#[test]
+fn the_cue_for_depth_thins_far_hair() {
+    let covered = |z: f32, depth_cue: f32| {
+        let mut hairs = Hairs::default();
+        hairs.add(&[[-60.0, -30.0, 40.0], [60.0, -30.0, 40.0]], 4.0, [1.0; 3], 1.0);
+        hairs.add(&[[-60.0, 30.0, z], [60.0, 30.0, z]], 4.0, [1.0; 3], 1.0);
+        let image = hairs.render(None, &[], [0.0; 3], &Settings { depth_cue, ..even() });
+        let rows = |from: usize| image.rgb[from * 160..(from + 65) * 160].iter().map(|c| c[0]).sum::<f32>();
+        [rows(65), rows(0)]
+    };
+    let [near, far] = covered(-40.0, 0.0);
+    assert!((near / far - 1.0).abs() < 1e-3);
+    let [near_cued, far_cued] = covered(-40.0, 0.75);
+    assert!((near_cued / near - 1.0).abs() < 1e-3 && (far_cued / far - 0.25).abs() < 1e-2, "{near_cued} {far_cued}");
+    // Nothing to tell apart.
+    assert_eq!(covered(40.0, 0.75), covered(40.0, 0.0));
 }

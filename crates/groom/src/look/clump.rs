@@ -9,6 +9,7 @@
 
 use super::axes::{self, RootAxes};
 use super::lanes::{Kernel, LANES, Lanes, fetch, run};
+use super::member::Members;
 use super::{CHUNK, Param, V3, at_station, lengths, relay, station_weights};
 use pelage_geom::rng::{channel, uniform};
 use pelage_geom::{NONE, StrandId};
@@ -308,11 +309,37 @@ pub fn dilations(r: &[f32], mean: [f32; 4], deviation: [f32; 4], scale: f32, key
     r.iter().map(|r| stations.at(key, *r).map(|x| x.max(0.0))).collect()
 }
 
-/// Multiplies each hair's factors on width and opacity by those of hair of percent 1, as far as it is clumped.
-pub fn wet(c: &Clump, width: f32, opacity: f32, out: &mut [[f32; 2]]) {
+/// Multiplies each hair's factors on width and opacity by those of hair of percent 1, as far as it is clumped; the third
+/// number is how wet it is by that, 0 to 1.
+pub fn wet(c: &Clump, width: f32, opacity: f32, out: &mut [[f32; 3]]) {
     for (h, out) in out.iter_mut().enumerate().filter(|(h, _)| c.clump[*h] != NONE) {
         let percent = c.percent.of(h).clamp(0.0, 1.0);
         out[0] *= 1.0 + (width - 1.0) * percent;
         out[1] *= 1.0 + (opacity - 1.0) * percent;
+        out[2] = 1.0 - (1.0 - out[2]) * (1.0 - percent);
     }
+}
+
+/// How far out on its clump each point of hairs of `points` points lies, and which way: its way from the same point of the
+/// centre hair, over that of the farthest such point of the clump. Zero without a clump and on the centre.
+pub fn sides(points: usize, position: &[[f32; 3]], members: &Members) -> Vec<[f32; 3]> {
+    let way = |i: usize| {
+        let c = members.clump[i / points];
+        (c != NONE).then(|| {
+            V3::from(position[i]) - V3::from(position[members.centre[c as usize] as usize * points + i % points])
+        })
+    };
+    let mut far = vec![0.0f32; members.centre.len() * points];
+    for i in 0..position.len() {
+        if let Some(w) = way(i) {
+            let far = &mut far[members.clump[i / points] as usize * points + i % points];
+            *far = far.max(w.norm_squared());
+        }
+    }
+    let side = |i: usize| {
+        let w = way(i)?;
+        let far = far[members.clump[i / points] as usize * points + i % points].sqrt();
+        (far > 0.0).then(|| (w / far).into())
+    };
+    (0..position.len()).into_par_iter().map(|i| side(i).unwrap_or_default()).collect()
 }

@@ -1,7 +1,7 @@
 use crate::common::*;
 use pelage_geom::NONE;
 use pelage_groom::look::member::{
-    Members, Sites, centres, members, members_plain, nearest_hairs, representatives, sides, whole_clumps,
+    Members, Sites, centres, densities, members, members_plain, nearest_hairs, representatives, sides, whole_clumps,
 };
 use pelage_groom::look::region::regions;
 
@@ -153,4 +153,40 @@ fn the_nearest_hair_is_the_nearest() {
     assert_eq!(found[0], 42);
     let d = |h: usize| (double(position[h]) - double(asked[1])).norm();
     assert!((0..500).all(|h| d(found[1] as usize) <= d(h)));
+}
+
+#[test]
+fn densities_are_hairs_per_area() {
+    // A sphere of radius 5 with 20,000 hairs, of which one half has four times as many as the other.
+    let even = |i: u64| {
+        let (z, a) = (r(21, i, 0), std::f64::consts::PI * r(21, i, 1));
+        let s = (1.0 - z * z).sqrt();
+        single(V::new(z, s * libm::cos(a), s * libm::sin(a)) * 5.0)
+    };
+    let position: Vec<[f32; 3]> =
+        (0..40_000).map(even).enumerate().filter(|(i, p)| p[0] > 0.0 || i % 4 == 0).map(|(_, p)| p).collect();
+    let area = 2.0 * std::f32::consts::PI * 25.0;
+    let found = densities(&position);
+    for (side, hairs) in [(1.0, 20_000.0), (-1.0, 5_000.0)] {
+        // Away from the border, whose hairs have both kinds around them.
+        let own: Vec<f32> =
+            position.iter().zip(&found).filter(|(p, _)| p[0] * side > 1.0).map(|(_, d)| d * area / hairs).collect();
+        let mean = own.iter().sum::<f32>() / own.len() as f32;
+        // Sixteen at random are one of sixteen too many on average.
+        assert!((mean - 1.0).abs() < 0.08, "{mean}");
+    }
+    // By brute force.
+    for i in (0..position.len()).step_by(997) {
+        let mut square: Vec<f32> =
+            position.iter().map(|q| (double(*q) - double(position[i])).norm_squared() as f32).collect();
+        square.sort_by(f32::total_cmp);
+        let expected = 16.0 / (std::f32::consts::PI * square[16]);
+        assert!((found[i] / expected - 1.0).abs() < 1e-4, "{} {expected}", found[i]);
+    }
+    // Few hairs, hairs at one place, hairs far apart.
+    assert_eq!((densities(&[]), densities(&[[1.0; 3]])), (vec![], vec![0.0]));
+    assert!(densities(&[[0.0; 3]; 40]).iter().all(|d| *d > 0.0));
+    let mut far = vec![[0.0f32; 3]; 3];
+    (far[1][0], far[2][0]) = (1e-3, 1e6);
+    assert!(densities(&far).iter().all(|d| d.is_finite() && *d > 0.0));
 }

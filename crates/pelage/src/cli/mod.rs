@@ -11,6 +11,7 @@ mod watch;
 
 use crate::Error;
 use crate::stage::Stage;
+use crate::stage::heat::Column;
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -118,6 +119,19 @@ pub struct PreviewArguments {
     /// Draw the still again whenever an input changes, with few hairs first; Ctrl-C ends it
     #[arg(long, conflicts_with_all = ["to", "frames", "force", "json"])]
     pub watch: bool,
+    /// A picture of every frame (or of those of --frames), into preview.####.png
+    #[arg(long, conflicts_with_all = ["watch", "to", "hairs", "crop", "turntable", "show"])]
+    pub sequence: bool,
+    /// The still's frame from all sides, into turntable.###.png
+    #[arg(long, conflicts_with_all = ["watch", "to", "frames", "hairs", "crop", "show"])]
+    pub turntable: bool,
+    /// A column of the hairs as colours with a legend, into preview-COLUMN.png: length, density, width, opacity, strain,
+    /// penetration, transmittance, transmittance:LIGHT, clump, clump:LEVEL, wetness
+    #[arg(long, value_name = "COLUMN", conflicts_with_all = ["watch", "to", "frames"])]
+    pub show: Option<Column>,
+    /// Ends of the scale of --show: LOW,HIGH; the smallest and the largest value if not given
+    #[arg(long, value_name = "LOW,HIGH", value_parser = parse_range, allow_hyphen_values = true, requires = "show")]
+    pub range: Option<Range>,
     /// Only this percentage of the hairs, into preview-draft.png; with --watch those of the draft, 10 if not given, 100
     /// for no draft
     #[arg(long, value_name = "PERCENT", value_parser = parse_percent, conflicts_with_all = ["to", "frames"])]
@@ -130,6 +144,21 @@ pub struct PreviewArguments {
 /// A region of a picture: left, upper, right and lower border in [0, 1].
 #[derive(Clone, Copy, Debug)]
 pub struct Crop(pub [f64; 4]);
+
+/// Ends of a scale.
+#[derive(Clone, Copy, Debug)]
+pub struct Range(pub [f32; 2]);
+
+/// Pictures beside the still.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wanted {
+    /// The contact sheet.
+    Sheet,
+    /// One a frame.
+    Sequence,
+    /// From all sides.
+    Turntable,
+}
 
 /// A parsed list of frames.
 #[derive(Clone, Debug)]
@@ -209,13 +238,22 @@ fn parse_crop(text: &str) -> Result<Crop, String> {
     if ordered(0) && ordered(1) { Ok(Crop(crop)) } else { Err(bad()) }
 }
 
+/// "0,12.5" -> the ends.
+fn parse_range(text: &str) -> Result<Range, String> {
+    let ends: Option<Vec<f32>> = text.split(',').map(|x| x.trim().parse().ok()).collect();
+    match ends.and_then(|e| <[f32; 2]>::try_from(e).ok()) {
+        Some([low, high]) if low < high && (high - low).is_finite() => Ok(Range([low, high])),
+        _ => Err(format!("`{text}` is not a scale: write LOW,HIGH with LOW < HIGH")),
+    }
+}
+
 /// Does what the arguments say; true if the exit code is 0.
 pub fn execute(arguments: Arguments) -> Result<bool, Error> {
     match arguments.command {
         Command::Init { dir, skin, meters_per_unit, sample } => {
             init::init(&dir, skin.as_deref(), meters_per_unit, sample)
         }
-        Command::Run(a) => run::run(a, false),
+        Command::Run(a) => run::run(a),
         Command::Preview(a) => preview::preview(a),
         Command::Plan(a) => run::plan(a),
         Command::Inspect { file, json } => inspect::inspect(&file, json),
@@ -262,6 +300,18 @@ mod tests {
         }
         assert_eq!((parse_percent("2.5"), parse_percent("100%")), (Ok(2.5), Ok(100.0)));
         assert!(["0", "-1", "100.1", "NaN", "inf", "ten", ""].iter().all(|bad| parse_percent(bad).is_err()));
+    }
+
+    #[test]
+    fn scales_and_columns_are_checked() {
+        assert_eq!(parse_range("-0.5, 12").unwrap().0, [-0.5, 12.0]);
+        assert!(["", "1", "2,1", "1,1", "a,b", "0,inf", "nan,1", "0,1,2"].iter().all(|bad| parse_range(bad).is_err()));
+        for name in ["length", "clump:2", "transmittance:key", "transmittance", "density"] {
+            assert!(name.parse::<Column>().is_ok(), "{name}");
+        }
+        for bad in ["", "lenght", "clump:x", "length:1", "clump:-1"] {
+            assert!(bad.parse::<Column>().is_err(), "{bad}");
+        }
     }
 
     #[test]

@@ -1,11 +1,11 @@
 //! `pelage preview`: the pictures of a shot, or a part of its still.
 
-use super::{PreviewArguments, print, run, watch};
+use super::{PreviewArguments, Wanted, print, run, watch};
 use crate::Error;
 use crate::progress::Progress;
 use crate::project::Project;
 use crate::report::Report;
-use crate::stage::preview::{Part, part};
+use crate::stage::preview::{Part, Show, part};
 use crate::stage::{Options, Runner, Stage};
 use std::path::PathBuf;
 
@@ -14,15 +14,24 @@ pub fn preview(a: PreviewArguments) -> Result<bool, Error> {
     if a.watch {
         return watch::watch(&a);
     }
-    if a.hairs.is_none() && a.crop.is_none() {
-        return run::run(a.run, true);
+    if a.hairs.is_none() && a.crop.is_none() && a.show.is_none() {
+        let wanted = match (a.sequence, a.turntable) {
+            (true, _) => Wanted::Sequence,
+            (_, true) => Wanted::Turntable,
+            _ => Wanted::Sheet,
+        };
+        return run::pictures(a.run, wanted);
     }
     run::threads(a.run.jobs)?;
     let project = Project::open(&a.run.shot)?;
     let wanted = wanted(&a, a.hairs.unwrap_or(100.0));
-    let name = if a.crop.is_some() { "preview-crop.png" } else { "preview-draft.png" };
+    let name = match (&a.show, a.crop) {
+        (Some(column), _) => format!("preview-{column}.png"),
+        (None, Some(_)) => "preview-crop.png".to_owned(),
+        (None, None) => "preview-draft.png".to_owned(),
+    };
     let options = Options { force: a.run.force, ..Options::default() };
-    let (path, report) = draw(&project, &wanted, name, options, &mut Progress::new(a.run.quiet))?;
+    let (path, report) = draw(&project, &wanted, &name, options, &mut Progress::new(a.run.quiet))?;
     if wanted.hairs == 100.0 {
         run::keep(&project, &report)?;
     }
@@ -32,7 +41,8 @@ pub fn preview(a: PreviewArguments) -> Result<bool, Error> {
 
 /// The part of the still that is asked for, with so many of the hairs.
 pub(super) fn wanted(a: &PreviewArguments, hairs: f64) -> Part {
-    Part { hairs, crop: a.crop.map_or(Part::default().crop, |c| c.0) }
+    let show = a.show.clone().map(|column| Show { column, range: a.range.map(|r| r.0) });
+    Part { hairs, crop: a.crop.map_or(Part::default().crop, |c| c.0), show }
 }
 
 /// Brings up to date what a part of the still reads, and draws it.

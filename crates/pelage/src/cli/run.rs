@@ -1,24 +1,17 @@
 //! `pelage run`, `pelage plan`, `pelage preview`.
 
-use super::{RunArguments, print};
+use super::{RunArguments, Wanted, print};
 use crate::Error;
 use crate::config::ExportFormat;
 use crate::files::write_whole;
 use crate::progress::Progress;
 use crate::project::Project;
 use crate::report::Report;
-use crate::stage::{Options, PlannedStage, Runner, Stage};
+use crate::stage::{Options, Pictures, PlannedStage, Runner, Stage};
 use std::io::Write;
 
-fn options(a: &RunArguments, sheet: bool) -> Options {
-    Options {
-        to: a.to,
-        frames: a.frames.as_ref().map(|f| f.0.clone()),
-        force: a.force,
-        without: sheet.then_some(Stage::Export),
-        sheet,
-        draft: false,
-    }
+fn options(a: &RunArguments) -> Options {
+    Options { to: a.to, frames: a.frames.as_ref().map(|f| f.0.clone()), force: a.force, ..Options::default() }
 }
 
 /// Sets the number of threads. Results do not depend on it.
@@ -28,24 +21,50 @@ pub(super) fn threads(jobs: Option<u16>) -> Result<(), Error> {
     pool.map_err(|e| Error::input(format!("--jobs {jobs}: {e}"), "give fewer"))
 }
 
-/// Brings a shot up to date; with `sheet`, only what its pictures need.
-pub fn run(a: RunArguments, sheet: bool) -> Result<bool, Error> {
+/// Brings a shot up to date.
+pub fn run(a: RunArguments) -> Result<bool, Error> {
     threads(a.jobs)?;
     let project = Project::open(&a.shot)?;
-    let mut options = options(&a, sheet);
-    if sheet && options.frames.is_none() {
-        let frames = project.sheet_frames().into_iter().chain([project.still_frame()]);
-        options.frames = Some(frames.collect());
-    }
+    let options = options(&a);
+    bring(&a, &project, options)
+}
+
+/// Makes pictures of a shot and what they need, no files.
+pub fn pictures(a: RunArguments, wanted: Wanted) -> Result<bool, Error> {
+    threads(a.jobs)?;
+    let project = Project::open(&a.shot)?;
+    let mut options = Options { without: Some(Stage::Export), ..options(&a) };
+    let (still, sheet) = (project.still_frame(), project.sheet_frames());
+    let framed = || project.shot.value.preview.camera.is_none().then(|| sheet.clone()).into_iter().flatten();
+    let mut frames = options.frames.take();
+    options.pictures = match wanted {
+        Wanted::Sheet => {
+            frames.get_or_insert_with(|| sheet.iter().copied().chain([still]).collect());
+            Pictures::Sheet
+        }
+        Wanted::Turntable => {
+            frames = Some([still].into());
+            Pictures::Turntable
+        }
+        Wanted::Sequence => {
+            let drawn = frames.take().unwrap_or_else(|| project.frames.keys().copied().collect());
+            frames = Some(drawn.iter().copied().chain(framed()).collect());
+            Pictures::Sequence(drawn)
+        }
+    };
+    bring(&a, &project, Options { frames, ..options })
+}
+
+fn bring(a: &RunArguments, project: &Project, options: Options) -> Result<bool, Error> {
     let mut progress = Progress::new(a.quiet);
-    let mut runner = Runner::new(&project, options, &mut progress)?;
+    let mut runner = Runner::new(project, options, &mut progress)?;
     let report = runner.run()?;
     drop(runner);
-    keep(&project, &report)?;
-    for name in leftovers(&project) {
+    keep(project, &report)?;
+    for name in leftovers(project) {
         progress.say(&format!("note: {name} in the output folder is of an earlier run: its format is not asked for"));
     }
-    print(&if a.json { report.json() } else { summary(&report, &project) });
+    print(&if a.json { report.json() } else { summary(&report, project) });
     Ok(true)
 }
 
@@ -89,7 +108,7 @@ fn summary(report: &Report, project: &Project) -> String {
 pub fn plan(a: RunArguments) -> Result<bool, Error> {
     let project = Project::open(&a.shot)?;
     let mut progress = Progress::new(true);
-    let planned = Runner::new(&project, options(&a, false), &mut progress)?.planned();
+    let planned = Runner::new(&project, options(&a), &mut progress)?.planned();
     if a.json {
         print(&(serde_json::to_string_pretty(&planned).expect("plain JSON") + "\n"));
     } else if planned.iter().all(|s| s.run.is_empty()) {

@@ -29,6 +29,10 @@ pub struct Light {
     /// Linear colour. Default: white.
     #[serde(default = "white", deserialize_with = "exactly")]
     pub color: [f64; 3],
+    /// Degrees beyond a right angle up to which it lights fur in pictures, 0 to 90: a light from behind reaches round the body.
+    /// Default: 0.
+    #[serde(default)]
+    pub wrap: f64,
     /// First and last frame at which it is on. Default: always.
     #[serde(default, deserialize_with = "some_exactly")]
     pub frames: Option<[i32; 2]>,
@@ -87,6 +91,10 @@ pub struct Shadow {
     /// Instead: the error of transmittance that is wanted (root mean square), from which the tool takes the cheapest settings
     /// that it has measured to reach it.
     pub error: Option<f64>,
+    /// Part of its length by which dense, long hair is shortened where it casts shadows, 0 to 0.95, thinner fur by less:
+    /// lightens white fur, in which light goes round in ways that are not computed. What arrives is then no longer what
+    /// physics says. Default: 0.
+    pub shorten: f64,
 }
 
 /// Settings of shadows by name.
@@ -120,6 +128,7 @@ impl Document<ShotFile> {
             }
         }
         let s = &self.value.shadow;
+        self.within("shadow.shorten", s.shorten, 0.0, 0.95)?;
         if let Some(error) = s.error {
             if !(1e-4..=1.0).contains(&error) {
                 let what = format!("{error} is out of range");
@@ -178,6 +187,7 @@ impl Document<ShotFile> {
             self.check_keys(&format!("{at}.{key}"), keyed)?;
         }
         self.within(&format!("{at}.softness"), l.softness.unwrap_or(0.0), 0.0, 1.0)?;
+        self.within(&format!("{at}.wrap"), l.wrap, 0.0, 90.0)?;
         l.color.iter().try_for_each(|c| self.within(&format!("{at}.color"), *c, 0.0, 1e6))?;
         if l.frames.is_some_and(|[a, b]| a > b) {
             return Err(self.error(&format!("{at}.frames"), "the last frame comes before the first", "first, last"));
@@ -185,7 +195,7 @@ impl Document<ShotFile> {
         Ok(())
     }
 
-    fn check_keys<T>(&self, at: &str, keyed: &Keyed<T>) -> Result<(), ConfigError> {
+    pub(super) fn check_keys<T>(&self, at: &str, keyed: &Keyed<T>) -> Result<(), ConfigError> {
         if keyed.in_order() && keyed.0.iter().all(|k| k.frame.is_finite()) {
             return Ok(());
         }

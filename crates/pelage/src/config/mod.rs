@@ -7,6 +7,7 @@ mod light;
 mod look;
 mod look_check;
 mod look_value;
+mod preview;
 mod shot;
 mod simulate;
 
@@ -23,9 +24,8 @@ pub use look::{
     WindLook,
 };
 pub use look_value::{LookValue, Varied, VariedValue, VaryScale};
-pub use shot::{
-    CacheSettings, Export, ExportFormat, GroomRef, Look, LookOverride, Preview, Shot, ShotFile, Skin, UpAxis,
-};
+pub use preview::{CameraSettings, Preview, PreviewTone, Shade};
+pub use shot::{CacheSettings, Export, ExportFormat, GroomRef, Look, LookOverride, Shot, ShotFile, Skin, UpAxis};
 pub use simulate::{BodyKind, BodyMesh, BodySettings};
 pub use simulate::{Material, SEGMENTS, Simulate, StrandModel, Target, WindSettings, check_material};
 

@@ -4,6 +4,7 @@ use super::document::{ConfigError, Document, exactly};
 use super::keyed::Keyed;
 use super::light::{Light, Shadow};
 use super::look::Operator;
+use super::preview::Preview;
 use super::simulate::{Simulate, Target};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -190,30 +191,6 @@ pub enum ExportFormat {
     Ply,
 }
 
-/// Pictures to write.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct Preview {
-    /// Frame of the still. Default: the middle of the shot.
-    pub frame: Option<i32>,
-    /// Width and height in pixels. Default: `[1280, 960]`.
-    #[serde(deserialize_with = "exactly")]
-    pub size: [u32; 2],
-    /// Direction from the subject to the camera. Default: from the front, a little to the side and above.
-    #[serde(deserialize_with = "exactly")]
-    pub from: [f64; 3],
-    /// Pictures in the contact sheet of `pelage preview`. Default: 8.
-    pub sheet: u32,
-    /// Zoom on the subject: 1 frames all of the skin and hair, 2 shows half of that. Default: 1.
-    pub zoom: f64,
-}
-
-impl Default for Preview {
-    fn default() -> Self {
-        Preview { frame: None, size: [1280, 960], from: [0.5, 0.15, 1.0], sheet: 8, zoom: 1.0 }
-    }
-}
-
 /// Where finished steps are kept.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -233,7 +210,6 @@ impl Document<ShotFile> {
     pub fn check(&self) -> Result<(), ConfigError> {
         let s = &self.value;
         let bad = |key: &str, what: &str, help: &str| Err(self.error(key, what, help));
-        let positive = |x: f64| x.is_finite() && x > 0.0;
         let name_ok = |c: char| c.is_alphanumeric() || "-_. ".contains(c);
         if s.shot.name.is_empty() || !s.shot.name.chars().all(name_ok) || s.shot.name.starts_with('.') {
             return bad("shot.name", "is not a folder name", "use letters, digits, '-', '_' and '.'");
@@ -257,22 +233,7 @@ impl Document<ShotFile> {
         if s.export.formats.iter().enumerate().any(|(i, f)| s.export.formats[..i].contains(f)) {
             return bad("export.formats", "names a format twice", "");
         }
-        if let Some(f) = s.preview.frame.filter(|f| !(s.shot.frames[0]..=s.shot.frames[1]).contains(f)) {
-            let help = format!("the shot goes from {} to {}", s.shot.frames[0], s.shot.frames[1]);
-            return Err(self.error("preview.frame", format!("{f} is not a frame of the shot"), help));
-        }
-        if s.preview.size.iter().any(|&x| !(16..=8192).contains(&x)) {
-            return bad("preview.size", "must be between 16 and 8192 pixels", "");
-        }
-        if !s.preview.from.iter().all(|x| x.is_finite()) || s.preview.from.iter().all(|&x| x == 0.0) {
-            return bad("preview.from", "must be a direction", "for example [0.0, 0.0, 1.0]");
-        }
-        if !positive(s.preview.zoom) {
-            return bad("preview.zoom", "must be above 0", "1 shows everything");
-        }
-        if !(1..=100).contains(&s.preview.sheet) {
-            return bad("preview.sheet", "must be between 1 and 100 pictures", "");
-        }
+        self.check_preview()?;
         self.check_lights()?;
         self.check_simulate()
     }

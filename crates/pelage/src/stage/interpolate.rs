@@ -84,21 +84,19 @@ pub fn hairs(run: &mut Runner<'_>, what: What) -> Result<Displaced, Error> {
     counts.insert("points".to_owned(), out.position.len() as u64);
     let name = run.plan.step(what).name.clone();
     let mut file = std::io::Cursor::new(Vec::with_capacity(out.position.len() * 12 + 4096));
-    let wet: Vec<[f32; 3]> = out.wet.iter().map(|w| [w[0], w[1], 0.0]).collect();
-    let both: [&[[f32; 3]]; 2] = [&out.position, &wet];
-    let arrays = if wet.is_empty() { &both[..1] } else { &both[..] };
+    let both: [&[[f32; 3]]; 2] = [&out.position, &out.wet];
+    let arrays = if out.wet.is_empty() { &both[..1] } else { &both[..] };
     mcap::write_frame_payload(&mut file, &name, what.frame().unwrap_or(0), arrays)
         .expect("writing to memory does not fail");
     run.keep(what, counts, &[("frame.mcap", file.get_ref())])?;
     Ok(out)
 }
 
-/// Hairs as they lie in the cache: positions, and factors on width and opacity if they are wet.
+/// Hairs as they lie in the cache: positions, and if they are wet factors on width and opacity and how wet.
 fn unpacked(arrays: Vec<Vec<[f32; 3]>>) -> Option<Displaced> {
     let mut arrays = arrays.into_iter();
     let position = arrays.next()?;
-    let wet = arrays.next().unwrap_or_default().into_iter().map(|w| [w[0], w[1]]).collect();
-    Some(Displaced { position, wet })
+    Some(Displaced { position, wet: arrays.next().unwrap_or_default() })
 }
 
 /// Hairs of a layer at rest before anything displaces them.

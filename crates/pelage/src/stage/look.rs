@@ -55,8 +55,8 @@ struct Column {
 pub struct Displaced {
     /// Points, scene units relative to the skin's origin.
     pub position: Vec<[f32; 3]>,
-    /// Factors on width and opacity of each hair; empty if nothing is wet.
-    pub wet: Vec<[f32; 2]>,
+    /// Factors on width and opacity of each hair, and how wet it is, 0 to 1; empty if nothing is wet.
+    pub wet: Vec<[f32; 3]>,
 }
 
 impl Displaced {
@@ -436,7 +436,7 @@ impl<'a> Job<'a, '_> {
         };
         clump(points, &settings, &line, &mut self.out.position);
         if let Some(w) = &c.wet {
-            self.out.wet.resize(self.roots.id.len(), [1.0; 2]);
+            self.out.wet.resize(self.roots.id.len(), [1.0, 1.0, 0.0]);
             wet(&settings, w.width as f32, w.opacity as f32, &mut self.out.wet);
         }
         Ok(())

@@ -15,6 +15,7 @@ mod skin;
 pub mod curves;
 pub mod export;
 pub mod groom;
+pub mod heat;
 pub mod instance;
 pub mod interpolate;
 pub mod preview;
@@ -23,7 +24,7 @@ pub mod simulate;
 pub mod tables;
 
 pub use plan::{Plan, Step, What, candidate_density, layer_seed};
-pub use run::{Options, PlannedStage, Runner};
+pub use run::{Options, Pictures, PlannedStage, Runner};
 pub use skin::{Skin, SkinPose};
 
 /// A stage, in the order of the flow.

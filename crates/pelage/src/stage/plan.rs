@@ -4,7 +4,7 @@ use super::Stage;
 use super::plan_light::is_shadowed;
 use super::plan_look::finished_rest;
 use crate::cache::{Field, Recipe};
-use crate::config::{Comb, ExportFormat, Feature, MapRef, Parting, Target};
+use crate::config::{Comb, ExportFormat, Feature, Keyed, MapRef, Parting, Target, Vector};
 use crate::project::{Project, SkinAt, frame_list};
 use crate::timeline::Timeline;
 use std::collections::BTreeMap;
@@ -52,6 +52,10 @@ pub enum What {
     Still,
     /// The contact sheet over frames.
     Sheet,
+    /// The picture of a frame in a sequence.
+    Picture(i32),
+    /// A picture of the turntable.
+    Turn(u32),
 }
 
 /// A step of a shot.
@@ -89,12 +93,12 @@ pub(super) mod version {
     pub const SIMULATE: u32 = 4;
     pub const INTERPOLATE: u32 = 1;
     pub const CLUMP: u32 = 1;
-    pub const LOOK: u32 = 1;
+    pub const LOOK: u32 = 2;
     pub const COLLISION: u32 = 2;
     pub const AREAS: u32 = 1;
     pub const SHADOW: u32 = 1;
     pub const EXPORT: u32 = 1;
-    pub const PREVIEW: u32 = 2;
+    pub const PREVIEW: u32 = 3;
 }
 
 /// Candidates are made for the next power of two of the density, hairs per square centimetre, so that tweaking a
@@ -148,25 +152,41 @@ impl Plan {
         let shadows = |frame: i32, written: bool| {
             let all = 0..project.shot.value.light.len();
             let of = move |l: usize| is_shadowed(project, l, frame, written).then_some(What::Shadow(l as u32, frame));
-            all.filter_map(of).collect::<Vec<What>>()
+            all.filter_map(of)
         };
         all.extend(project.frames.keys().flat_map(|f| shadows(*f, true)));
         for format in &project.shot.value.export.formats {
             let name = format!("export/{}", format.name());
             plan.add(What::Export(*format), name, Stage::Export, r.export(*format), &all);
         }
-        let of = |frames: &[i32]| {
+        // Frames that are drawn, and frames by which the camera is placed.
+        let of = |drawn: &[i32], framed: &[i32]| {
+            let mut frames = drawn.to_vec();
+            if project.shot.value.preview.camera.is_none() {
+                frames.extend(framed.iter().filter(|f| !drawn.contains(f)));
+            }
             let hairs = frames.iter().flat_map(|f| layers.clone().map(|i| What::Frame(i, *f)));
-            let shadows = frames.iter().flat_map(|f| shadows(*f, false));
+            let shadows = drawn.iter().flat_map(|f| shadows(*f, false));
             look.iter().copied().chain(hairs).chain(shadows).collect::<Vec<What>>()
         };
-        let still = of(&[project.still_frame()]);
-        let picture = r.picture().param("frame", project.still_frame(), r.in_shot("preview.frame"));
-        plan.add(What::Still, "preview/still".into(), Stage::Preview, picture, &still);
-        let sheet = of(&project.sheet_frames());
-        let pictures =
-            r.picture().param("sheet", frame_list(&project.sheet_frames()), r.in_shot("preview.sheet (frames)"));
-        plan.add(What::Sheet, "preview/sheet".into(), Stage::Preview, pictures, &sheet);
+        let (still, sheet) = (project.still_frame(), project.sheet_frames());
+        let mut add = |what, name: String, recipe, reads: &[What]| {
+            plan.add(what, format!("preview/{name}"), Stage::Preview, recipe, reads);
+        };
+        let frame = r.picture(&[still]).param("frame", still, r.in_shot("preview.frame"));
+        add(What::Still, "still".into(), frame.clone(), &of(&[still], &[]));
+        let frames = r.picture(&sheet).param("sheet", frame_list(&sheet), r.in_shot("preview.sheet (frames)"));
+        add(What::Sheet, "sheet".into(), frames, &of(&sheet, &[]));
+        for f in project.frames.keys() {
+            let recipe = r.picture(&[*f]).param("sequence", f, "the frame's number");
+            let recipe = recipe.param("sheet", frame_list(&sheet), r.in_shot("preview.sheet (frames)"));
+            add(What::Picture(*f), format!("sequence/{f}"), recipe, &of(&[*f], &sheet));
+        }
+        let count = project.shot.value.preview.turntable;
+        for k in 0..count {
+            let turn = frame.clone().param("turn", format!("{} of {count}", k + 1), r.in_shot("preview.turntable"));
+            add(What::Turn(k), format!("turntable/{}", k + 1), turn, &of(&[still], &[]));
+        }
         plan
     }
 
@@ -291,7 +311,7 @@ impl What {
     /// The frame that it is made for; `None` for what is made once.
     pub fn frame(self) -> Option<i32> {
         match self {
-            What::Frame(_, f) | What::Hits(f) | What::Shadow(_, f) => Some(f),
+            What::Frame(_, f) | What::Hits(f) | What::Shadow(_, f) | What::Picture(f) => Some(f),
             _ => None,
         }
     }
@@ -303,7 +323,7 @@ impl What {
             What::Simulate(i, _) | What::Frame(i, _) | What::Clump(i, _) => Some(i),
             What::Length(i) | What::Width(i) | What::Opacity(i) | What::Color(i) => Some(i),
             What::Curves | What::Place | What::Comb | What::Hits(_) => None,
-            What::Shadow(..) | What::Export(_) | What::Still | What::Sheet => None,
+            What::Shadow(..) | What::Export(_) | What::Still | What::Sheet | What::Picture(_) | What::Turn(_) => None,
         }
     }
 }
@@ -563,12 +583,38 @@ impl<'a> Reader<'a> {
         self.lights_of_files(self.along(r))
     }
 
-    fn picture(&self) -> Recipe {
+    /// What pictures of frames read.
+    fn picture(&self, frames: &[i32]) -> Recipe {
         let p = &self.project.shot.value.preview;
+        let s = &p.shade;
         let mut r = self.rest(Recipe::new("preview", version::PREVIEW));
-        for (key, value) in
-            [("size", format!("{:?}", p.size)), ("from", format!("{:?}", p.from)), ("zoom", p.zoom.to_string())]
-        {
+        let place = match &p.camera {
+            None => vec![("from", format!("{:?}", p.from())), ("zoom", p.zoom().to_string())],
+            Some(c) => {
+                let at =
+                    |k: &Keyed<Vector>| frames.iter().map(|f| format!("{:?}", k.vectors().at(f64::from(*f)))).collect();
+                let fov = frames.iter().map(|f| c.fov.at(f64::from(*f)).to_string()).collect::<Vec<_>>();
+                let list = |v: Vec<String>| v.join(" ");
+                vec![
+                    ("camera.eye", list(at(&c.eye))),
+                    ("camera.target", list(at(&c.target))),
+                    ("camera.up", format!("{:?}", c.up)),
+                    ("camera.fov", list(fov)),
+                ]
+            }
+        };
+        let rest = [
+            ("size", format!("{:?}", p.size)),
+            ("exposure", p.exposure.to_string()),
+            ("tone", format!("{:?}", p.tone).to_lowercase()),
+            ("depth_cue", p.depth_cue.to_string()),
+            ("shade.fur", s.fur.to_string()),
+            ("shade.specular", s.specular.to_string()),
+            ("shade.through", s.through.to_string()),
+            ("shade.guard", s.guard.to_string()),
+            ("shade.wetness", s.wetness.to_string()),
+        ];
+        for (key, value) in place.into_iter().chain(rest) {
             r = r.param(key, value, self.in_shot(&format!("preview.{key}")));
         }
         self.lights_of_pictures(self.along(r)).param(

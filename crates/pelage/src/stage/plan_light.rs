@@ -17,13 +17,9 @@ pub fn written_lights(project: &Project) -> Vec<usize> {
     shot.light.iter().enumerate().filter(|(_, l)| l.export).map(|(l, _)| l).collect()
 }
 
-/// True if a light's shadows at a frame are read by a file (`written`), or by a picture.
+/// True if a light's shadows at a frame are read by a file (`written`), or would be by a picture of it.
 pub fn is_shadowed(project: &Project, l: usize, frame: i32, written: bool) -> bool {
-    let used = match written {
-        true => written_lights(project).contains(&l),
-        false => frame == project.still_frame() || project.sheet_frames().contains(&frame),
-    };
-    used && project.shot.value.light[l].is_on(frame)
+    (!written || written_lights(project).contains(&l)) && project.shot.value.light[l].is_on(frame)
 }
 
 /// How shadows are made: maps, or rays where exact ones are asked for.
@@ -57,7 +53,7 @@ impl Plan {
     /// Steps that make the shadows of a frame.
     pub(super) fn add_shadows(&mut self, r: &Reader<'_>, frame: i32, at: &SkinAt) {
         for (l, light) in r.project.shot.value.light.iter().enumerate() {
-            if ![true, false].iter().any(|written| is_shadowed(r.project, l, frame, *written)) {
+            if !is_shadowed(r.project, l, frame, false) {
                 continue;
             }
             let mut recipe = r.shadow(l, light, frame, at);
@@ -102,6 +98,10 @@ impl Reader<'_> {
             ),
         };
         r = self.widths(r.param("quality", how, self.in_shot("shadow.quality")));
+        let shorten = project.shot.value.shadow.shorten;
+        if shorten > 0.0 {
+            r = r.param("shorten", shorten, self.in_shot("shadow.shorten"));
+        }
         for (i, share) in project.share.iter().enumerate().filter(|(_, s)| **s != 1.0) {
             r = r.param(&format!("share[{i}]"), share, "the share of hairs that is drawn");
         }
@@ -135,6 +135,10 @@ impl Reader<'_> {
         let on = light.frames.map_or(String::new(), |[a, b]| format!(", frames {a} to {b}"));
         let key = format!("light[{l}]");
         let value = format!("{name}intensity {}, color {:?}{on}", light.intensity, light.color);
-        r.param(&key, value, self.in_shot(&key))
+        let r = r.param(&key, value, self.in_shot(&key));
+        if named || light.wrap == 0.0 {
+            return r;
+        }
+        r.param(&format!("{key}.wrap"), light.wrap, self.in_shot(&format!("{key}.wrap")))
     }
 }

@@ -68,7 +68,7 @@ pub fn effects(project: &Project, i: usize) -> [Vec<Effect>; 2] {
 }
 
 /// Levels of clumps of a layer that act, before or after the simulation.
-fn acting_clumps(project: &Project, i: usize) -> Vec<usize> {
+pub fn acting_clumps(project: &Project, i: usize) -> Vec<usize> {
     let acting = effects(project, i).concat();
     (0..project.groom.value.layer[i].clump.len()).filter(|k| acting.contains(&Effect::Clump(*k))).collect()
 }

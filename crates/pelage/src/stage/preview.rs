@@ -2,16 +2,21 @@
 
 use super::look::Displaced;
 use super::plan_light::source;
+use super::plan_look::acting_clumps;
 use super::run::Runner;
-use super::{SkinPose, What, curves, export, groom, instance, interpolate, shadow};
+use super::{Skin, SkinPose, What, clumps, curves, export, groom, heat, instance, interpolate, layer_seed, shadow};
 use crate::Error;
-use crate::config::UpAxis;
+use crate::config::{Keyed, PreviewTone, UpAxis, Vector};
 use crate::files::unfinished;
 use crate::format::{HairLayer, image::write_png};
-use pelage_geom::{Offsets, SurfacePoint};
+use pelage_geom::{Offsets, SurfacePoint, Vec3};
+use pelage_groom::instance::is_guard;
+use pelage_groom::look::clump::sides;
+use pelage_light::heat::{NO_VALUE, category_color, heat_color, range_of};
 use pelage_light::shadow::Source;
 use pelage_light::{
-    Camera, HairView, Image, Light, Region, Scene, Settings, SkinView, contact_sheet, render_region, studio_lights,
+    Camera, HairShade, HairView, Image, Light, Region, Scene, Settings, SkinView, Tone, contact_sheet, render_region,
+    studio_lights,
 };
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -20,6 +25,15 @@ use std::rc::Rc;
 const BACKGROUND: [f32; 3] = [0.16, 0.17, 0.19];
 /// Linear colour of skin, a neutral warm clay.
 const SKIN: [f32; 3] = [0.42, 0.31, 0.26];
+/// Linear colour of skin under a heat map.
+const BARE: [f32; 3] = [0.3; 3];
+/// Factor of the highlights of wet hair. At 1 it looks dry and matted, over 5 it looks like glass.
+const WET_SHINE: f32 = 3.0;
+/// Part of its light that wet hair gains on the side of its clump that is turned to the light, and loses on the other.
+/// Under 0.2 clumps do not stand apart, at 1 their far sides are black.
+const WET_SIDE: f32 = 0.6;
+/// Part of the distance to the target nearer than which a camera sees nothing.
+const NEAR: f64 = 0.02;
 /// Hairs of a layer that the camera is placed by: all, or as many evenly over them. The margin holds the others.
 const FRAMED: usize = 20_000;
 /// Hairs that a picture draws at most. Of more, every n-th is drawn, n times as wide: the same cover, less time and
@@ -35,7 +49,7 @@ pub fn still(run: &mut Runner<'_>) -> Result<(), Error> {
 }
 
 /// What is drawn of the still.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Part {
     /// Percentage of the hairs, in (0, 100], drawn as much wider as they are fewer. The run's project is the shot thinned
     /// to it ([`crate::project::Project::thinned`]); of hair from a curves file, which that leaves whole, every n-th is
@@ -43,11 +57,22 @@ pub struct Part {
     pub hairs: f64,
     /// Left, upper, right and lower border in [0, 1] of the picture's width and height.
     pub crop: [f64; 4],
+    /// A column of the hairs as colours instead of hair in light.
+    pub show: Option<Show>,
+}
+
+/// A heat map.
+#[derive(Clone, Debug)]
+pub struct Show {
+    /// What it shows.
+    pub column: heat::Column,
+    /// Ends of the scale; those of the values if not given.
+    pub range: Option<[f32; 2]>,
 }
 
 impl Default for Part {
     fn default() -> Self {
-        Part { hairs: 100.0, crop: [0.0, 0.0, 1.0, 1.0] }
+        Part { hairs: 100.0, crop: [0.0, 0.0, 1.0, 1.0], show: None }
     }
 }
 
@@ -68,7 +93,9 @@ impl Part {
 pub fn part(run: &mut Runner<'_>, part: &Part, name: &str) -> Result<PathBuf, Error> {
     let picture = seen(run, part)?;
     let path = run.project.out_dir().join(name);
-    let unfinished = write(&path, &picture)?;
+    // Colours of a heat map are those of its legend.
+    let tone = if part.show.is_some() { Tone::Straight } else { tone(run) };
+    let unfinished = write(&path, &picture, tone)?;
     std::fs::rename(&unfinished, &path).map_err(Error::disk(&path))?;
     Ok(path)
 }
@@ -76,25 +103,62 @@ pub fn part(run: &mut Runner<'_>, part: &Part, name: &str) -> Result<PathBuf, Er
 fn seen(run: &mut Runner<'_>, part: &Part) -> Result<Image, Error> {
     let (frame, size) = (run.project.still_frame(), run.project.shot.value.preview.size);
     let drawn = drawn(run, part.hairs)?;
-    let camera = camera(run, &drawn, &[frame])?;
-    draw(run, &drawn, &camera, frame, size, &part.region(size))
+    let camera = camera(run, &drawn, &[frame], frame)?;
+    let region = part.region(size);
+    match &part.show {
+        Some(show) => heat_map(run, &drawn, &camera, frame, size, &region, show),
+        None => draw(run, &drawn, &camera, frame, size, &region),
+    }
 }
 
-/// Draws the contact sheet: frames evenly over the shot, each a third of the still's size, seen by one camera.
+/// Draws the contact sheet: frames evenly over the shot, each a third of the still's size.
 pub fn sheet(run: &mut Runner<'_>) -> Result<(), Error> {
     let frames = run.project.sheet_frames();
     let drawn = drawn(run, 100.0)?;
-    let camera = camera(run, &drawn, &frames)?;
     let size = run.project.shot.value.preview.size.map(|x| (x / 3).max(16) * FINER);
     let whole = Part::default().region(size);
     let mut pictures = Vec::new();
     for frame in &frames {
+        let camera = camera(run, &drawn, &frames, *frame)?;
         let mut picture = draw(run, &drawn, &camera, *frame, size, &whole)?.shrunk(FINER as usize);
-        picture.draw_number(i64::from(*frame), (picture.width / 160).max(1));
+        let dot = (picture.width / 320).max(1);
+        picture.draw_text(&frame.to_string(), [2, picture.height as i64 - 9 * dot as i64], dot);
         pictures.push(picture);
     }
     let columns = (1..=frames.len()).find(|c| c * c >= frames.len()).unwrap_or(1);
     save(run, What::Sheet, "sheet.png", &contact_sheet(&pictures, columns))
+}
+
+/// Draws the picture of a frame, seen as in the contact sheet.
+pub fn picture(run: &mut Runner<'_>, frame: i32) -> Result<(), Error> {
+    let (drawn, size) = (drawn(run, 100.0)?, run.project.shot.value.preview.size);
+    let framed = run.project.sheet_frames();
+    let camera = camera(run, &drawn, &framed, frame)?;
+    let picture = draw(run, &drawn, &camera, frame, size, &Part::default().region(size))?;
+    save(run, What::Picture(frame), &format!("preview.{frame:04}.png"), &picture)
+}
+
+/// Draws picture `k` of the turntable: the still's frame from a camera that goes round it.
+pub fn turn(run: &mut Runner<'_>, k: u32) -> Result<(), Error> {
+    let (frame, size) = (run.project.still_frame(), run.project.shot.value.preview.size);
+    let drawn = drawn(run, 100.0)?;
+    let p = run.project.shot.value.preview.clone();
+    let (camera, axis) = match &p.camera {
+        Some(_) => {
+            let camera = camera(run, &drawn, &[frame], frame)?;
+            (camera, camera.target)
+        }
+        None => {
+            let points = points(run, &drawn, &[frame])?;
+            let (camera, axis) =
+                Camera::frame_turning(&points, p.from().map(|x| -x), up(run), aspect(run), p.turntable);
+            (camera.zoomed(p.zoom()), axis)
+        }
+    };
+    let angle = std::f64::consts::TAU * f64::from(k) / f64::from(p.turntable);
+    let camera = camera.turned(axis, up(run), angle);
+    let picture = draw(run, &drawn, &camera, frame, size, &Part::default().region(size))?;
+    save(run, What::Turn(k), &format!("turntable.{:03}.png", k + 1), &picture)
 }
 
 /// Layers to draw, and which hairs of them: every n-th of `all`.
@@ -153,8 +217,37 @@ fn hairs(run: &mut Runner<'_>, drawn: &Drawn, i: usize, frame: i32) -> Result<Di
     Ok(Displaced { position, wet: all.wet.into_iter().step_by(drawn.every).collect() })
 }
 
-/// A camera that sees skin and hair at all of the frames, as near as it can.
-fn camera(run: &mut Runner<'_>, drawn: &Drawn, frames: &[i32]) -> Result<Camera, Error> {
+/// The camera of the shot at a frame; without one, a camera that sees skin and hair at all of the `frames`, as near as it
+/// can.
+fn camera(run: &mut Runner<'_>, drawn: &Drawn, frames: &[i32], frame: i32) -> Result<Camera, Error> {
+    if let Some(c) = &run.project.shot.value.preview.camera {
+        let at = |k: &Keyed<Vector>| k.vectors().at(f64::from(frame));
+        let (eye, target) = (at(&c.eye), at(&c.target));
+        let near = NEAR * (Vec3::from(target) - Vec3::from(eye)).norm();
+        let up = c.up.unwrap_or(up(run));
+        return Ok(Camera { eye, target, up, fov_y_deg: c.fov.at(f64::from(frame)), near, parallel_height: None });
+    }
+    if let Some((_, camera)) = run.camera.as_ref().filter(|(of, _)| of == frames) {
+        return Ok(*camera);
+    }
+    let points = points(run, drawn, frames)?;
+    let p = &run.project.shot.value.preview;
+    let camera = Camera::frame_points(points, p.from().map(|x| -x), up(run), aspect(run)).zoomed(p.zoom());
+    run.camera = Some((frames.to_vec(), camera));
+    Ok(camera)
+}
+
+fn aspect(run: &Runner<'_>) -> f64 {
+    let [w, h] = run.project.shot.value.preview.size.map(f64::from);
+    w / h
+}
+
+fn up(run: &Runner<'_>) -> [f64; 3] {
+    if run.project.shot.value.shot.up == UpAxis::Y { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] }
+}
+
+/// Points of skin and hair at frames.
+fn points(run: &mut Runner<'_>, drawn: &Drawn, frames: &[i32]) -> Result<Vec<[f64; 3]>, Error> {
     let origin = run.origin()?;
     let mut points = Vec::new();
     for frame in frames {
@@ -170,10 +263,7 @@ fn camera(run: &mut Runner<'_>, drawn: &Drawn, frames: &[i32]) -> Result<Camera,
             }
         }
     }
-    let shot = &run.project.shot.value;
-    let up = if shot.shot.up == UpAxis::Y { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] };
-    let aspect = f64::from(shot.preview.size[0]) / f64::from(shot.preview.size[1]);
-    Ok(Camera::frame_points(points, shot.preview.from.map(|x| -x), up, aspect).zoomed(shot.preview.zoom))
+    Ok(points)
 }
 
 /// The skin at a frame, if there is one.
@@ -194,6 +284,29 @@ fn normals(run: &mut Runner<'_>, drawn: &Drawn, pose: &SkinPose, i: usize) -> Re
     })
 }
 
+/// What is drawn of a layer at a frame.
+struct Strands {
+    hairs: Displaced,
+    /// Diameters at the points and opacities.
+    width: Vec<f32>,
+    opacity: Vec<f32>,
+    /// Normals of the skin at the roots; empty without a skin.
+    normal: Vec<[f32; 3]>,
+}
+
+fn strands(run: &mut Runner<'_>, drawn: &Drawn, i: usize, frame: i32) -> Result<Strands, Error> {
+    let (layer, hairs) = (&drawn.layers[i], hairs(run, drawn, i, frame)?);
+    let (width, opacity) = match hairs.wet.is_empty() {
+        true => (layer.width.clone(), layer.opacity.clone()),
+        false => hairs.wet_columns(Some(layer)),
+    };
+    let normal = match pose(run, frame)? {
+        Some(pose) => normals(run, drawn, &pose, i)?,
+        None => Vec::new(),
+    };
+    Ok(Strands { hairs, width, opacity, normal })
+}
+
 /// Draws a region of the picture of `size` at a frame.
 fn draw(
     run: &mut Runner<'_>,
@@ -203,38 +316,136 @@ fn draw(
     size: [u32; 2],
     region: &Region,
 ) -> Result<Image, Error> {
-    let layers = &drawn.layers;
-    let (pose, origin) = (pose(run, frame)?, run.origin()?);
-    let hairs = (0..layers.len()).map(|i| hairs(run, drawn, i, frame)).collect::<Result<Vec<_>, Error>>()?;
-    let wet: Vec<(Vec<f32>, Vec<f32>)> = hairs.iter().zip(layers).map(|(h, l)| h.wet_columns(Some(l))).collect();
-    let normals = (0..layers.len())
-        .map(|i| match &pose {
-            Some(pose) => normals(run, drawn, pose, i),
-            None => Ok(Vec::new()),
-        })
-        .collect::<Result<Vec<Vec<[f32; 3]>>, Error>>()?;
+    let count = drawn.layers.len();
+    let strands = (0..count).map(|i| strands(run, drawn, i, frame)).collect::<Result<Vec<_>, Error>>()?;
+    let gloss = (0..count).map(|i| gloss(run, drawn, i, frame)).collect::<Result<Vec<_>, Error>>()?;
     let Lit { lights, transmittance } = lights(run, drawn, camera, frame)?;
-    let views: Vec<HairView<'_>> = (0..layers.len())
+    let origin = run.origin()?;
+    let views: Vec<HairView<'_>> = (0..count)
         .map(|i| HairView {
-            offsets: &layers[i].offsets,
-            position: &hairs[i].position,
-            origin,
-            width: if wet[i].0.is_empty() { &layers[i].width } else { &wet[i].0 },
-            color: &layers[i].color,
-            opacity: if wet[i].1.is_empty() { &layers[i].opacity } else { &wet[i].1 },
-            root_normal: &normals[i],
+            shine: &gloss[i].shine,
+            side: &gloss[i].side,
             transmittance: &transmittance[i],
+            ..view(&drawn.layers[i], &strands[i], origin)
         })
         .collect();
-    let skin = if pose.is_some() { Some(groom::skin(run)?) } else { None };
-    let surface = pose.as_ref().zip(skin.as_ref()).map(|(pose, skin)| SkinView {
-        position: &pose.position,
-        triangle: &skin.mesh.triangle,
-        normal: &pose.normal,
-        color: SKIN,
-    });
-    let scene = Scene { skin: surface, layers: &views, lights: &lights, background: BACKGROUND };
-    Ok(render_region(&scene, camera, size.map(|x| x as usize), region, &Settings::default()).0)
+    let p = &run.project.shot.value.preview;
+    let (exposure, standard) = (p.exposure as f32, HairShade::default());
+    let hair = HairShade {
+        skin_normal: p.shade.fur as f32,
+        specular: standard.specular * p.shade.specular as f32,
+        glint: standard.glint * p.shade.specular as f32,
+        through: p.shade.through as f32,
+        ..standard
+    };
+    let settings = Settings { hair, depth_cue: p.depth_cue as f32, ..Settings::default() };
+    let pose = pose(run, frame)?;
+    let skin = pose.as_ref().map(|_| groom::skin(run)).transpose()?;
+    let skin = skin.as_ref().zip(pose.as_ref()).map(|(skin, pose)| surface(skin, pose, SKIN));
+    let scene = Scene { skin, layers: &views, lights: &lights, background: BACKGROUND };
+    Ok(render_region(&scene, camera, size.map(|x| x as usize), region, &settings).0.exposed(exposure))
+}
+
+fn view<'a>(layer: &'a HairLayer, strands: &'a Strands, origin: [f64; 3]) -> HairView<'a> {
+    HairView {
+        offsets: &layer.offsets,
+        position: &strands.hairs.position,
+        origin,
+        width: &strands.width,
+        color: &layer.color,
+        opacity: &strands.opacity,
+        root_normal: &strands.normal,
+        shine: &[],
+        side: &[],
+        transmittance: &[],
+    }
+}
+
+fn surface<'a>(skin: &'a Skin, pose: &'a SkinPose, color: [f32; 3]) -> SkinView<'a> {
+    SkinView { position: &pose.position, triangle: &skin.mesh.triangle, normal: &pose.normal, color }
+}
+
+/// Draws a column of the hairs as colours, with a legend.
+fn heat_map(
+    run: &mut Runner<'_>,
+    drawn: &Drawn,
+    camera: &Camera,
+    frame: i32,
+    size: [u32; 2],
+    region: &Region,
+    show: &Show,
+) -> Result<Image, Error> {
+    let heat::Heat { values, title, scale } = heat::column(run, &show.column, frame)?;
+    let range = show.range.unwrap_or_else(|| range_of(values.iter().flatten().copied()));
+    let paint = |v: f32| match scale {
+        true => heat_color(v, range),
+        false if v < 0.0 => NO_VALUE,
+        false => category_color(v as u64),
+    };
+    let mut layers = Vec::new();
+    let mut all = Vec::new();
+    for (i, layer) in drawn.layers.iter().enumerate() {
+        let values = &values[i];
+        let colors: Vec<[f32; 3]> = match values.len() == drawn.all[i].len() {
+            true => values.iter().step_by(drawn.every).map(|v| paint(*v)).collect(),
+            false => nth(values, &drawn.all[i], drawn.every).map(paint).collect(),
+        };
+        layers.push(HairLayer {
+            color: colors,
+            width: layer.width.clone(),
+            offsets: layer.offsets.clone(),
+            ..HairLayer::default()
+        });
+        all.push(strands(run, drawn, i, frame)?);
+    }
+    let origin = run.origin()?;
+    let views: Vec<HairView<'_>> = layers.iter().zip(&all).map(|(l, s)| view(l, s, origin)).collect();
+    // Light from all around shows colours as they are.
+    let settings = Settings { ambient: [1.0; 3], ..Settings::default() };
+    let pose = pose(run, frame)?;
+    let skin = pose.as_ref().map(|_| groom::skin(run)).transpose()?;
+    let skin = skin.as_ref().zip(pose.as_ref()).map(|(skin, pose)| surface(skin, pose, BARE));
+    let scene = Scene { skin, layers: &views, lights: &[], background: BACKGROUND };
+    let mut picture = render_region(&scene, camera, size.map(|x| x as usize), region, &settings).0;
+    picture.draw_legend(&title, scale.then_some(range));
+    Ok(picture)
+}
+
+/// How hair of a layer shines: factors of its highlights, and which way it lies on its clump where it is wet.
+#[derive(Default)]
+struct Gloss {
+    shine: Vec<f32>,
+    side: Vec<[f32; 3]>,
+}
+
+fn gloss(run: &mut Runner<'_>, drawn: &Drawn, i: usize, frame: i32) -> Result<Gloss, Error> {
+    let shade = run.project.shot.value.preview.shade.clone();
+    let all = interpolate::hairs(run, What::Frame(i, frame))?;
+    let guard = run.project.groom.value.layer[i].guard.clone().filter(|_| run.project.curves.is_none());
+    if guard.is_none() && all.wet.is_empty() && shade.wetness == 0.0 {
+        return Ok(Gloss::default());
+    }
+    let hairs = drawn.all[i].len();
+    let wet: Vec<f32> = (0..hairs).map(|h| all.wet.get(h).map_or(0.0, |w| w[2]).max(shade.wetness as f32)).collect();
+    let mut shine: Vec<f32> = wet.iter().map(|w| 1.0 + (WET_SHINE - 1.0) * w).collect();
+    if let Some(guard) = guard {
+        let seed = u64::from(layer_seed(&run.project.groom.value.layer[i].name));
+        let roots = instance::roots(run, i)?;
+        let guards = shine.iter_mut().zip(&roots.id).filter(|(_, id)| is_guard(**id, guard.percent, seed));
+        guards.for_each(|(s, _)| *s *= shade.guard as f32);
+    }
+    let mut side = Vec::new();
+    if let Some(&level) = acting_clumps(run.project, i).first()
+        && let Some(points) = drawn.all[i].uniform_count()
+        && wet.iter().any(|w| *w > 0.0)
+    {
+        let members = clumps::clumps(run, i, level)?;
+        let all = sides(points, &all.position, &members);
+        let part = |p: usize| all[p].map(|x| x * WET_SIDE * wet[p / points]);
+        let scaled: Vec<[f32; 3]> = (0..all.len()).map(part).collect();
+        side = nth(&scaled, &drawn.all[i], drawn.every).collect();
+    }
+    Ok(Gloss { shine: shine.into_iter().step_by(drawn.every).collect(), side })
 }
 
 /// Lights, and for each layer what arrives of each light at the points that are drawn; nothing where that is not known.
@@ -253,15 +464,19 @@ fn lights(run: &mut Runner<'_>, drawn: &Drawn, camera: &Camera, frame: i32) -> R
     let mut lights = Vec::new();
     for (l, light) in run.project.shot.value.light.iter().enumerate().filter(|(_, l)| l.is_on(frame)) {
         let strength = light.intensity.at(f64::from(frame));
-        let color = light.color.map(|c| (c * strength) as f32);
+        let lit = Light {
+            color: light.color.map(|c| (c * strength) as f32),
+            wrap: light.wrap.to_radians(),
+            ..Light::default()
+        };
         lights.push(match source(light, frame) {
-            Source::Directional { direction } => Light { direction: direction.into(), color, ..Light::default() },
-            Source::Point { position } => Light { position: Some(position.into()), color, ..Light::default() },
+            Source::Directional { direction } => Light { direction: direction.into(), ..lit },
+            Source::Point { position } => Light { position: Some(position.into()), ..lit },
             Source::Spot { position, direction, cone, softness } => Light {
                 direction: direction.into(),
-                color,
                 position: Some(position.into()),
                 cone: Some([cone, cone + softness]),
+                ..lit
             },
         });
         for (i, column) in shadow::columns(run, l, frame)?.into_iter().enumerate() {
@@ -274,17 +489,24 @@ fn lights(run: &mut Runner<'_>, drawn: &Drawn, camera: &Camera, frame: i32) -> R
     Ok(Lit { lights, transmittance })
 }
 
+fn tone(run: &Runner<'_>) -> Tone {
+    match run.project.shot.value.preview.tone {
+        PreviewTone::Shoulder => Tone::Shoulder,
+        PreviewTone::Straight => Tone::Straight,
+    }
+}
+
 fn save(run: &mut Runner<'_>, what: What, name: &str, picture: &Image) -> Result<(), Error> {
-    let part = write(&run.project.out_dir().join(name), picture)?;
+    let part = write(&run.project.out_dir().join(name), picture, tone(run))?;
     export::publish(run, what, vec![(part, name.to_owned())])
 }
 
 /// Writes a picture beside its path.
-fn write(path: &Path, picture: &Image) -> Result<PathBuf, Error> {
+fn write(path: &Path, picture: &Image, tone: Tone) -> Result<PathBuf, Error> {
     let out = path.parent().unwrap_or(path);
     std::fs::create_dir_all(out).map_err(Error::disk(out))?;
     let part = unfinished(path);
-    write_png(&part, picture.width, picture.height, &picture.to_srgb8())?;
+    write_png(&part, picture.width, picture.height, &picture.to_srgb8(tone))?;
     Ok(part)
 }
 

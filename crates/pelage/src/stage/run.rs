@@ -30,11 +30,36 @@ pub struct Options {
     pub force: Option<Stage>,
     /// A stage to leave out.
     pub without: Option<Stage>,
-    /// Make the contact sheet too.
-    pub sheet: bool,
+    /// Pictures to make.
+    pub pictures: Pictures,
     /// This is not the shot itself but a thinned one (see [`Project::thinned`]): what it does is not remembered as the
     /// shot's last run, and what is odd in it is told when the shot itself runs.
     pub draft: bool,
+}
+
+/// Pictures of a run.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Pictures {
+    /// The still.
+    #[default]
+    Still,
+    /// The still and the contact sheet.
+    Sheet,
+    /// These frames.
+    Sequence(BTreeSet<i32>),
+    /// The still's frame from all sides.
+    Turntable,
+}
+
+impl Pictures {
+    /// True if a picture of a frame is drawn.
+    fn show(&self, project: &Project, frame: i32) -> bool {
+        match self {
+            Pictures::Sequence(frames) => frames.contains(&frame),
+            Pictures::Sheet if project.sheet_frames().contains(&frame) => true,
+            _ => frame == project.still_frame(),
+        }
+    }
 }
 
 /// What would run in a stage, and why.
@@ -75,6 +100,8 @@ pub struct Runner<'a> {
     pub(super) scene: Option<(i32, Rc<super::shadow::Scene>)>,
     pub(super) props: Option<Rc<Vec<super::shadow::Prop>>>,
     pub(super) hits: Option<(i32, Rc<super::areas::Hits>)>,
+    /// The camera that frames the hairs of some frames.
+    pub(super) camera: Option<(Vec<i32>, pelage_light::Camera)>,
     pub(super) placed: Option<pelage_groom::control::ControlHairs>,
     pub(super) control: Option<Rc<pelage_groom::control::ControlHairs>>,
     pub(super) curves: Option<Rc<super::curves::CurveHair>>,
@@ -120,6 +147,7 @@ impl<'a> Runner<'a> {
             scene: None,
             props: None,
             hits: None,
+            camera: None,
             placed: None,
             control: None,
             curves: None,
@@ -217,7 +245,9 @@ impl<'a> Runner<'a> {
             return false;
         }
         match step.what {
-            What::Export(_) | What::Still | What::Sheet => super::export::is_written(self, step),
+            What::Export(_) | What::Still | What::Sheet | What::Picture(_) | What::Turn(_) => {
+                super::export::is_written(self, step)
+            }
             _ => self.store.contains(&step.recipe.key()),
         }
     }
@@ -227,17 +257,20 @@ impl<'a> Runner<'a> {
         let wanted = |s: &&Step| match s.what {
             What::Frame(_, f) => self.options.frames.as_ref().is_none_or(|o| o.contains(&f)),
             What::Shadow(l, f) => {
-                let project = self.project;
-                let used =
-                    is_shadowed(project, l as usize, f, true) || self.options.sheet || f == project.still_frame();
-                used && self.options.frames.as_ref().is_none_or(|o| o.contains(&f))
+                let written = self.options.without != Some(Stage::Export);
+                let used = written && is_shadowed(self.project, l as usize, f, true);
+                (used || self.options.pictures.show(self.project, f))
+                    && self.options.frames.as_ref().is_none_or(|o| o.contains(&f))
             }
             What::Hits(f) => self.options.frames.as_ref().is_none_or(|o| o.last().is_some_and(|last| f <= *last)),
             What::Simulate(_, k) => {
                 let last = self.options.frames.as_ref().map(|o| o.last().copied().unwrap_or(i32::MIN));
                 last.is_none_or(|f| *Timeline::new(self.project).stretch(k).start() <= i64::from(f))
             }
-            What::Sheet => self.options.sheet,
+            What::Still => matches!(self.options.pictures, Pictures::Still | Pictures::Sheet),
+            What::Sheet => self.options.pictures == Pictures::Sheet,
+            What::Picture(f) => matches!(&self.options.pictures, Pictures::Sequence(frames) if frames.contains(&f)),
+            What::Turn(_) => self.options.pictures == Pictures::Turntable,
             _ => true,
         };
         self.plan.steps.iter().filter(|s| s.stage == stage).filter(wanted).cloned().collect()
@@ -463,6 +496,8 @@ impl<'a> Runner<'a> {
             What::Export(format) => export::write(self, what, format),
             What::Still => preview::still(self),
             What::Sheet => preview::sheet(self),
+            What::Picture(frame) => preview::picture(self, frame),
+            What::Turn(k) => preview::turn(self, k),
         }
     }
 }

@@ -2,14 +2,16 @@
 
 use super::plan_light::{settings, source, written_lights};
 use super::run::{Counts, Runner};
-use super::{What, export, groom, interpolate, look};
+use super::{What, clumps, curves, export, groom, interpolate, look};
 use crate::Error;
 use crate::config::Light;
 use crate::format::mcap::{read_state_payload, write_state_payload};
 use crate::format::{HairLayer, ply};
 use crate::project::{BodyFile, SkinAt};
 use pelage_geom::{Bvh, Topology, Vec3};
+use pelage_groom::look::member::densities;
 use pelage_light::shadow::{Footprint, ShadowHair, ShadowSettings, Solid, Source, transmittance, transmittance_exact};
+use pelage_light::shortened;
 use pelage_sim::body::Closed;
 use std::rc::Rc;
 
@@ -146,11 +148,29 @@ fn scene(run: &mut Runner<'_>, frame: i32) -> Result<Rc<Scene>, Error> {
         if wider != 1.0 {
             thickness.width.iter_mut().for_each(|w| *w *= wider);
         }
+        let shorten = run.project.shot.value.shadow.shorten;
+        if shorten > 0.0 {
+            let density = density(run, i)?;
+            let offsets = &thickness.offsets;
+            thickness.width = shortened(offsets, &hair.position, &thickness.width, &density, shorten);
+        }
         hairs.push((thickness, hair.position));
     }
     let found = Rc::new(Scene { hairs, solids: solids(run, frame)? });
     run.scene = Some((frame, found.clone()));
     Ok(found)
+}
+
+/// Hairs per square scene unit around the root of each hair of a layer, at rest.
+pub fn density(run: &mut Runner<'_>, i: usize) -> Result<Vec<f32>, Error> {
+    let root = match &run.project.curves {
+        Some(_) => {
+            let hair = curves::hair(run)?;
+            (0..hair.offsets.len()).map(|h| hair.position[hair.offsets.range(h).start]).collect()
+        }
+        None => clumps::sites(run, i)?.position.clone(),
+    };
+    Ok(densities(&root))
 }
 
 /// Skin and other meshes at a frame, holes closed.
