@@ -10,6 +10,7 @@ mod light;
 mod look;
 mod look_page;
 mod pictures;
+mod pictures_page;
 mod reference;
 mod rows;
 mod samples;

@@ -1,6 +1,7 @@
 //! A small picture of every parameter of the look: what it is at a low value, as it usually is, and high.
 
 mod features;
+pub mod light;
 
 /// One parameter in three pictures.
 pub struct Shown {

@@ -1,4 +1,5 @@
-//! Draws `docs/pictures/look/`: every parameter of the look in three pictures side by side.
+//! Draws `docs/pictures/look/` and `docs/pictures/light/`: every parameter of the look, and the settings of lights and
+//! pictures, in three pictures side by side.
 //!
 //! `cargo run --release -p pelage-tests --example parameter_pictures [KEY ...]`; with keys (or beginnings of keys), only those.
 
@@ -7,7 +8,8 @@ use image::{ExtendedColorType, ImageEncoder, RgbImage};
 use pelage::progress::Progress;
 use pelage::project::Project;
 use pelage::stage::{Options, Runner, Stage};
-use pelage_tests::parameters::{Shown, parameters};
+use pelage_tests::parameters::light::LIT;
+use pelage_tests::parameters::parameters;
 use pelage_tests::{ShotFolder, indexed_png};
 use std::path::Path;
 
@@ -19,34 +21,40 @@ const COLORS: usize = 24;
 
 fn main() {
     let wanted: Vec<String> = std::env::args().skip(1).collect();
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/pictures/look");
-    std::fs::create_dir_all(&folder).expect("a folder");
+    let pictures = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/pictures");
+    let is_wanted = |key: &str| wanted.is_empty() || wanted.iter().any(|w| key.starts_with(w));
     let mut bytes = 0;
-    for shown in parameters().filter(|s| wanted.is_empty() || wanted.iter().any(|w| s.key.starts_with(w))) {
-        let pictures = shown.settings.map(|setting| drawn(shown, setting));
-        let png = quantised(&row(&pictures));
+    let mut write = |folder: &str, name: String, three: [RgbImage; 3]| {
+        let png = quantised(&row(&three));
         bytes += png.len();
-        std::fs::write(folder.join(shown.file()), png).expect("a picture");
-        println!("{}", shown.key);
+        std::fs::create_dir_all(pictures.join(folder)).expect("a folder");
+        std::fs::write(pictures.join(folder).join(&name), png).expect("a picture");
+        println!("{folder}/{name}");
+    };
+    for shown in parameters().filter(|s| is_wanted(s.key)) {
+        write("look", shown.file(), shown.settings.map(|s| drawn(shown.key, s, shown.files(s))));
+    }
+    for lit in LIT.iter().filter(|l| is_wanted(l.key)) {
+        write("light", lit.file(), lit.settings.map(|s| drawn(lit.key, s, lit.files(s))));
     }
     println!("{bytes} bytes");
 }
 
 /// The still of the shot that shows a setting.
-fn drawn(shown: &Shown, setting: &str) -> RgbImage {
+fn drawn(key: &str, setting: &str, files: Vec<(String, Vec<u8>)>) -> RgbImage {
     let shot = ShotFolder::new("");
-    shown.files(setting).iter().for_each(|(name, bytes)| shot.write(name, bytes));
+    files.iter().for_each(|(name, bytes)| shot.write(name, bytes));
     let made = || {
         let project = Project::open(&shot.path().join("pipeline.toml"))?;
         let frames = Some([project.still_frame()].into());
         let options = Options { frames, without: Some(Stage::Export), ..Options::default() };
         Runner::new(&project, options, &mut Progress::new(true))?.run()
     };
-    let report = made().unwrap_or_else(|e| panic!("{} with `{setting}`: {e:?}", shown.key));
+    let report = made().unwrap_or_else(|e| panic!("{key} with `{setting}`: {e:?}"));
     for stage in &report.stages {
-        stage.warnings.iter().for_each(|w| println!("  {} `{setting}`: {w}", shown.key));
+        stage.warnings.iter().for_each(|w| println!("  {key} `{setting}`: {w}"));
         let told = stage.counts.iter().filter(|(k, n)| **n > 0 && k.contains("in the skin"));
-        told.for_each(|(k, n)| println!("  {} `{setting}`: {n} {k}", shown.key));
+        told.for_each(|(k, n)| println!("  {key} `{setting}`: {n} {k}"));
     }
     let picture = shot.read("out/shown/preview.png");
     image::load_from_memory(&picture).expect("a picture").into_rgb8()

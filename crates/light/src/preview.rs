@@ -43,7 +43,7 @@ pub struct HairView<'a> {
     pub opacity: &'a [f32],
     /// Unit normal of the skin at the root, one a strand (default none: shading by the hair's direction alone).
     pub root_normal: &'a [[f32; 3]],
-    /// Factor of the highlights, one a strand, >= 0 (default 1): guard hairs, wet hair.
+    /// Factor of the first highlight, one a strand, >= 0 (default 1): guard hairs, wet hair.
     pub shine: &'a [f32],
     /// How far out on its clump a point lies, and which way in scene space: 0 in the middle to 1 in length, one a point
     /// (default 0). What is turned to a light is brighter by that much, what is turned away darker: the production

@@ -117,7 +117,7 @@ pub(crate) struct HairPoint {
     pub color: V3,
     /// Unit normal of the skin at the root.
     pub normal: Option<V3>,
-    /// Factor of the highlights.
+    /// Factor of the first highlight.
     pub shine: f32,
     /// How far out on its clump it is, and which way: from 0 in the middle to 1 in length.
     pub side: V3,
@@ -177,7 +177,7 @@ impl HairModel {
     /// `light` unit and away from the hair, `normal` that of the skin at the root. With T, L, V for those:
     /// diffuse sin(T, L), highlight max(0, sin(T, L) sin(T, V) - (T.L)(T.V))^p, whose base is -cos of the sum of both
     /// angles, so that a shift of the highlight is a shift of that sum.
-    /// The highlights are `shine` times as strong; the shading of the skin falls off to 0 at a right angle and `wrap` (a
+    /// The first highlight is `shine` times as strong; the shading of the skin falls off to 0 at a right angle and `wrap` (a
     /// sine) beyond.
     pub fn reflect(&self, at: &HairPoint, eye: V3, light: V3, wrap: f32) -> V3 {
         let (s, HairPoint { tangent, normal, color, shine, .. }) = (&self.shade, *at);
@@ -195,7 +195,7 @@ impl HairModel {
         }
         let (cos, sin) = (sl * sv - tl * tv, sl * tv + tl * sv);
         let first = shine * s.specular * front * self.first.value(cos, sin);
-        let second = shine * s.glint * lit * self.second.value(cos, sin);
+        let second = s.glint * lit * self.second.value(cos, sin);
         color * (s.diffuse * diffuse + second) + V3::repeat(first)
     }
 }

@@ -108,7 +108,7 @@ pub struct Shade {
     pub specular: f64,
     /// Light that comes through a hair from behind, relative to what it sends back. Default: 0.6.
     pub through: f64,
-    /// Factor of the highlights of guard hairs. Default: 1.5.
+    /// Factor of the first highlight, that of the light's colour, of guard hairs. Default: 1.5.
     pub guard: f64,
     /// How wet all hair looks, 0 to 1; hair in wet areas is wet without it. Wet hair shines, and clumps are bright on the
     /// side of a light and dark on the other. Default: 0.

@@ -27,8 +27,8 @@ const BACKGROUND: [f32; 3] = [0.16, 0.17, 0.19];
 const SKIN: [f32; 3] = [0.42, 0.31, 0.26];
 /// Linear colour of skin under a heat map.
 const BARE: [f32; 3] = [0.3; 3];
-/// Factor of the highlights of wet hair. At 1 it looks dry and matted, over 5 it looks like glass.
-const WET_SHINE: f32 = 3.0;
+/// Factor of the first highlight of wet hair. Under 3 it looks dry and matted, over 15 it looks like glass.
+const WET_SHINE: f32 = 7.0;
 /// Part of its light that wet hair gains on the side of its clump that is turned to the light, and loses on the other.
 /// Under 0.2 clumps do not stand apart, at 1 their far sides are black.
 const WET_SIDE: f32 = 0.6;
