@@ -21,6 +21,7 @@ pub mod settle;
 pub mod simulation;
 pub mod springs;
 pub mod stage;
+pub mod stress;
 pub mod wind;
 
 pub use body::{

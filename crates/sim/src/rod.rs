@@ -458,6 +458,10 @@ pub fn relax<L: Lanes>(nodes: &mut [Node], elastic: &mut [Elastic], motion: &[Mo
     }
 }
 
+/// Largest part of its length by which an edge's natural length may differ from that at rest. At 1 hair as heavy as lead
+/// has edges of no length or less; real hair's are within 0.001.
+const BEARS: f64 = 0.5;
+
 /// Natural shape and rest lengths such that the hair as it stands is in equilibrium under `weight` (newtons, per node).
 ///
 /// A strand clamped at one end is statically determinate: from the tip to the root, the edge's tension and the three
@@ -501,6 +505,10 @@ pub fn stand<L: Lanes>(
         }
         let stretch = L::load(&elastic[i].stretch);
         let rest = e1.length - on * tension / L::if_gt(stretch, zero, stretch, one);
+        // An edge bears no more than leaves it a length.
+        let (least, most) = (e1.length * L::splat(1.0 - BEARS), e1.length * L::splat(1.0 + BEARS));
+        let rest = L::if_gt(rest, least, rest, least);
+        let rest = L::if_gt(most, rest, rest, most);
         L::if_gt(on, zero, rest, L::load(&nodes[i].length)).store(&mut nodes[i].length);
         // The reactions go on to the nodes behind.
         let a = sum3(&h.a, moment);
