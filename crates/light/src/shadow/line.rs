@@ -1,7 +1,9 @@
 //! Segments as rows of equal deposits of optical depth.
 
 use super::bins::Segment;
-use wide::{f32x4, i32x4};
+use super::registers::{LANES, Lanes};
+use super::slices::Slices;
+use wide::f32x4;
 
 /// Widest part of a segment that is drawn as one line, texels: the line has no width, and its depth lands up to half of
 /// this beside where it belongs. Wider segments are drawn as several lines side by side.
@@ -67,13 +69,13 @@ pub(crate) fn part_over(a: &[f32; 3], b: &[f32; 3], low: f32, high: f32) -> Opti
     (from < to).then_some([from, to])
 }
 
-/// A line in a volume, cut where it passes from column to column of texels along the axis it mostly follows (from row to
+/// A line in a tile, cut where it passes from column to column of texels along the axis it mostly follows (from row to
 /// row where it mostly goes across rows): point `origin` + t `step` for t in [`from`, `to`], cut at whole t. Each part is
 /// deposited at its middle, so every column has its share exactly; deposits at equal distances from the line's end instead
 /// bunch, which at 1.5 a texel makes the default too bright by 0.004.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Line {
-    /// Texels, and slices from 1 (layer 0 lies before the first).
+    /// Texels, and rows of [`Slices`].
     origin: [f32; 3],
     step: [f32; 3],
     from: f32,
@@ -86,25 +88,23 @@ pub(crate) struct Line {
     bounds: f32x4,
 }
 
-/// Four parts of a line: where they lie, texels and layers; optical depth of each, 0 beyond the last.
-struct Parts {
-    x: f32x4,
-    y: f32x4,
-    z: f32x4,
-    depth: f32x4,
+/// Parts of a line: the texel and the row of [`Slices`] that each lies in, and its optical depth.
+#[derive(Clone, Copy)]
+pub(crate) struct Parts<L> {
+    pub x: L,
+    pub y: L,
+    pub row: L,
+    pub depth: L,
 }
 
-/// Whole part of what is not negative.
-#[inline(always)]
-fn whole(v: f32x4) -> f32x4 {
-    v.fast_trunc_int().round_float()
-}
+/// 0, 1, 2 and so on.
+const COUNT: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
 
 impl Line {
-    /// Lines of a segment in a volume of `side` texels each way. Whatever the width and the place, the deposits add up
-    /// to the area that the hair covers.
-    #[inline]
-    pub fn of(segment: &Segment, side: usize, slices: usize, mut emit: impl FnMut(Line)) {
+    /// Lines of a segment in a tile of `side` texels each way. Whatever the width and the place, the deposits add up to the
+    /// area that the hair covers.
+    #[inline(always)]
+    pub fn of(segment: &Segment, side: f32, slices: &Slices, mut emit: impl FnMut(Line)) {
         let (a, b) = (segment.a, segment.b);
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
         let length = (dx * dx + dy * dy).sqrt();
@@ -112,8 +112,9 @@ impl Line {
         if !(depth > 0.0 && depth < f32::MAX) {
             return;
         }
+        let [a, b] = [a, b].map(|p| [p[0], p[1], slices.row(p[2])]);
         if segment.width <= LINE {
-            if let Some(l) = Line::new(a, b, depth, side as f32, slices as f32) {
+            if let Some(l) = Line::new(a, b, depth, side, slices) {
                 emit(l);
             }
             return;
@@ -123,26 +124,26 @@ impl Line {
         for k in 0..lines as usize {
             let t = (k as f32 + 0.5) / lines - 0.5;
             let shift = |p: [f32; 3]| [p[0] + nx * t, p[1] + ny * t, p[2]];
-            if let Some(l) = Line::new(shift(a), shift(b), depth / lines, side as f32, slices as f32) {
+            if let Some(l) = Line::new(shift(a), shift(b), depth / lines, side, slices) {
                 emit(l);
             }
         }
     }
 
-    /// The part of a line that lies over the volume and before its last plane.
-    #[inline]
-    fn new(a: [f32; 3], b: [f32; 3], depth: f32, side: f32, slices: f32) -> Option<Line> {
+    /// The part of a line that lies over the tile and before its last plane.
+    #[inline(always)]
+    fn new(a: [f32; 3], b: [f32; 3], depth: f32, side: f32, slices: &Slices) -> Option<Line> {
         let [from, to] = part_over(&a, &b, 0.0, side)?;
-        if a[2].min(b[2]) >= slices {
+        if slices.is_behind(a[2].min(b[2])) {
             return None;
         }
         let part = to - from;
         let d = [(b[0] - a[0]) * part, (b[1] - a[1]) * part, (b[2] - a[2]) * part];
-        let start = [a[0] + (b[0] - a[0]) * from, a[1] + (b[1] - a[1]) * from, a[2] + (b[2] - a[2]) * from + 1.0];
+        let start = [a[0] + (b[0] - a[0]) * from, a[1] + (b[1] - a[1]) * from, a[2] + (b[2] - a[2]) * from];
         let axis = usize::from(d[1].abs() > d[0].abs());
         let reach = d[axis].abs();
-        // Outside the slices one deposit is as good as many.
-        let deep = d[2].abs().min(slices + 2.0);
+        // Slices that it passes.
+        let deep = slices.between(start[2], start[2] + d[2]);
         let (parts, phase) = if deep <= PARTS * reach {
             let parts = if deep <= reach { 1.0 } else { (deep / reach) as u32 as f32 + 1.0 };
             // From the edge that lies behind the start.
@@ -172,70 +173,42 @@ impl Line {
         self.each * self.rate.abs().min(self.to - self.from)
     }
 
+    /// How many parts it has.
+    #[inline(always)]
+    pub fn count(&self) -> usize {
+        let whole = self.to as usize;
+        whole + usize::from((whole as f32) < self.to)
+    }
+
     /// The parts that may lie in the box [low, high) of texels: all that do, and at most a few more.
-    #[inline]
-    pub fn within(&self, low: [f32; 2], high: [f32; 2]) -> std::ops::Range<u32> {
+    #[inline(always)]
+    pub fn within(&self, low: [f32; 2], high: [f32; 2]) -> std::ops::Range<usize> {
         let axis = usize::from(self.step[1].abs() > self.step[0].abs());
         let (u, v) = ((low[axis] - self.origin[axis]) * self.rate, (high[axis] - self.origin[axis]) * self.rate);
         // Texels' edges are whole t, but for rounding.
         let from = (u.min(v) + 0.01).max(0.0);
         let to = (u.max(v) + 0.99).min(self.to + 1.0).max(0.0);
-        from as u32..to as u32
+        from as u32 as usize..to as u32 as usize
     }
 
-    /// Four parts from `t` on, texels kept in [0, edge] and layers in [0, end].
+    /// Sixteen parts from part `k` on, texels kept in [0, `edge`] and rows in [0, `end`]. Those behind the last have the
+    /// least depth that there is.
     #[inline(always)]
-    fn parts(&self, t: f32x4, edge: f32x4, end: f32x4) -> Parts {
-        let (from, to) = (t.fast_max(f32x4::splat(self.from)), (t + f32x4::ONE).fast_min(f32x4::splat(self.to)));
-        let middle = (from + to) * f32x4::HALF;
-        let at = |i: usize, most: f32x4| {
-            let v = f32x4::splat(self.origin[i]) + f32x4::splat(self.step[i]) * middle;
-            whole(v.fast_max(f32x4::ZERO).fast_min(most))
-        };
-        let depth = (to - from).fast_max(f32x4::ZERO) * f32x4::splat(self.each);
-        Parts { x: at(0, edge), y: at(1, edge), z: at(2, end), depth }
+    pub fn parts<L: Lanes>(&self, k: usize, edge: L, end: L) -> Parts<L> {
+        let t = L::splat(k as f32) + L::read(&COUNT);
+        let (from, to) = (t.max(L::splat(self.from)), (t + L::splat(1.0)).min(L::splat(self.to)));
+        let middle = (from + to) * L::splat(0.5);
+        let depth = ((to - from) * L::splat(self.each)).short();
+        let [x, y] = [self.at(0, middle, edge).whole(), self.at(1, middle, edge).whole()];
+        Parts { x, y, row: self.at(2, middle, end), depth }
     }
 
-    /// Hands out place and optical depth of each part, four at a time: places in an array of layers, rows and texels.
-    /// `size` is (side, rows' length, layers' length, last layer); places up to 2^24 are exact.
-    #[inline]
-    pub fn places(&self, [side, row, layer, last]: [usize; 4], mut visit: impl FnMut([i32; 4], [f32; 4])) {
-        let (edge, end) = (f32x4::splat(side as f32 - 0.5), f32x4::splat(last as f32 + 0.5));
-        let [rows, layers] = [row, layer].map(|v| f32x4::splat(v as f32));
-        let mut t = 0.0;
-        while t < self.to {
-            let Parts { x, y, z, depth } = self.parts(f32x4::splat(t) + f32x4::new(LANES), edge, end);
-            let place: i32x4 = (z * layers + y * rows + x).fast_trunc_int();
-            visit(place.to_array(), depth.to_array());
-            t += 4.0;
-        }
-    }
-
-    /// Hands out parts that lie in a box of `size` texels from `low` on: place in an array of rows of size[0], layer,
-    /// optical depth. Parts that lie outside go four to seven places behind the array. `side` and `last`
-    /// as for [`Line::places`].
-    #[inline]
-    pub fn places_within(
-        &self,
-        low: [f32; 2],
-        size: [f32; 2],
-        [side, last]: [usize; 2],
-        mut visit: impl FnMut([i32; 4], f32x4, f32x4),
-    ) {
-        let (edge, end) = (f32x4::splat(side as f32 - 0.5), f32x4::splat(last as f32 + 0.5));
-        let behind = f32x4::splat(size[0] * size[1] + 4.0) + f32x4::new(LANES);
-        for k in self.within(low, [low[0] + size[0], low[1] + size[1]]).step_by(4) {
-            let Parts { x, y, z, depth } = self.parts(f32x4::splat(k as f32) + f32x4::new(LANES), edge, end);
-            let (x, y) = (x - f32x4::splat(low[0]), y - f32x4::splat(low[1]));
-            let outside = |v: f32x4, n: f32| v.simd_lt(f32x4::ZERO) | v.simd_ge(f32x4::splat(n));
-            let outside = outside(x, size[0]) | outside(y, size[1]);
-            let place: i32x4 = outside.select(behind, y * f32x4::splat(size[0]) + x).fast_trunc_int();
-            visit(place.to_array(), z, depth);
-        }
+    /// Coordinate `i` at `t`, kept in [0, `most`].
+    #[inline(always)]
+    fn at<L: Lanes>(&self, i: usize, t: L, most: L) -> L {
+        (L::splat(self.origin[i]) + L::splat(self.step[i]) * t).max(L::splat(0.0)).min(most)
     }
 }
-
-const LANES: [f32; 4] = [0.0, 1.0, 2.0, 3.0];
 
 /// Largest whole number that is not larger, for sizes up to 2^31.
 #[inline(always)]

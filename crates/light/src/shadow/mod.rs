@@ -17,11 +17,14 @@ mod bins;
 mod exact;
 mod exp;
 mod line;
+mod planes;
 mod project;
+mod registers;
+mod sample;
 mod settings;
+mod slices;
 mod solid;
 mod tile;
-mod volume;
 
 pub use exact::{Footprint, Sample, ShadowError, transmittance_exact};
 pub use settings::{Interpolation, MEASURED, Measured, Placement, Quality, ShadowSettings, for_error};
@@ -36,7 +39,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Side of a tile, texels. A tile's slices should stay in the second-level cache: 36 x 36 texels with their border and
 /// 128 slices are 660 KB. Much smaller tiles repeat segments that cross their borders.
-pub(crate) const TILE: usize = 32;
+pub(crate) const TILE: usize = 64;
 
 /// Where light comes from: world space, scene units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -167,22 +170,19 @@ fn face(
         }
     }
     let cover = solid::Cover::new(solids, projection);
-    let (worked, hidden) = (0..grid * grid)
+    let done = (0..grid * grid)
         .into_par_iter()
         .map_init(
             || tile::Work::new(projection, settings, solids, &cover),
-            |work, t| match work.run(&chunks, layers, [t % grid, t / grid], t, cells) {
-                Some(hidden) => (1, hidden),
-                None => (0, 0),
-            },
+            |work, t| work.run(&chunks, layers, [t % grid, t / grid], t, cells),
         )
-        .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
-    counts.behind_solid += hidden;
+        .reduce(tile::Done::default, tile::Done::and);
+    counts.behind_solid += done.hidden;
     counts.texels = projection.texels;
-    counts.tiles[0] += worked;
+    counts.tiles[0] += done.tiles;
     counts.tiles[1] += grid * grid;
     let held: usize = chunks.iter().map(Chunk::bytes).sum();
-    counts.bytes = counts.bytes.max(held + volume::Volume::bytes(projection.filter, settings.slices));
+    counts.bytes = counts.bytes.max(held + done.bytes);
 }
 
 impl ShadowHair<'_> {
