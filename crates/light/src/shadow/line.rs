@@ -1,7 +1,7 @@
 //! Segments as rows of equal deposits of optical depth.
 
 use super::bins::Segment;
-use super::registers::{LANES, Lanes};
+use super::registers::{LANES, Lanes, least, most};
 use super::slices::Slices;
 use wide::f32x4;
 
@@ -54,17 +54,17 @@ pub(crate) fn thickness(width: f32, slant: f32, opacity: f32) -> f32 {
 pub(crate) fn part_over(a: &[f32; 3], b: &[f32; 3], low: f32, high: f32) -> Option<[f32; 2]> {
     let (mut from, mut to) = (0.0f32, 1.0f32);
     for i in 0..2 {
-        let (least, most) = (a[i].min(b[i]), a[i].max(b[i]));
-        if least >= low && most < high {
+        let (first, last) = (least(a[i], b[i]), most(a[i], b[i]));
+        if first >= low && last < high {
             continue;
         }
-        if least >= high || most < low {
+        if first >= high || last < low {
             return None;
         }
         let inverse = 1.0 / (b[i] - a[i]);
         let (u, v) = ((low - a[i]) * inverse, (high - a[i]) * inverse);
-        from = from.max(u.min(v));
-        to = to.min(u.max(v));
+        from = most(least(u, v), from);
+        to = least(most(u, v), to);
     }
     (from < to).then_some([from, to])
 }
@@ -84,6 +84,8 @@ pub(crate) struct Line {
     rate: f32,
     /// Optical depth per t.
     each: f32,
+    /// Least row.
+    near: f32,
     /// Least x and y, and negated most x and y.
     bounds: f32x4,
 }
@@ -134,7 +136,7 @@ impl Line {
     #[inline(always)]
     fn new(a: [f32; 3], b: [f32; 3], depth: f32, side: f32, slices: &Slices) -> Option<Line> {
         let [from, to] = part_over(&a, &b, 0.0, side)?;
-        if slices.is_behind(a[2].min(b[2])) {
+        if slices.is_behind(least(a[2], b[2])) {
             return None;
         }
         let part = to - from;
@@ -155,22 +157,24 @@ impl Line {
         let (inverse, rate) = (1.0 / parts, parts / d[axis]);
         let step = d.map(|v| v * inverse);
         let origin = [0, 1, 2].map(|i| start[i] - step[i] * phase);
-        let end = [start[0] + d[0], start[1] + d[1]];
-        let bounds =
-            f32x4::new([start[0].min(end[0]), start[1].min(end[1]), -start[0].max(end[0]), -start[1].max(end[1])]);
-        Some(Line { origin, step, from: phase, to: phase + parts, rate, each: depth * part * inverse, bounds })
+        let end = [0, 1, 2].map(|i| start[i] + d[i]);
+        let low = [0, 1, 2].map(|i| least(start[i], end[i]));
+        let bounds = f32x4::new([low[0], low[1], -most(start[0], end[0]), -most(start[1], end[1])]);
+        let each = depth * part * inverse;
+        Some(Line { origin, step, from: phase, to: phase + parts, rate, each, near: low[2], bounds })
     }
 
-    /// True if the line has nothing in a box, given as [high x, high y, -low x, -low y].
+    /// True if the line has nothing in a box, given as [high x, high y, -low x, -low y], or nothing before a row.
     #[inline(always)]
-    pub fn misses(&self, r#box: f32x4) -> bool {
-        self.bounds.simd_ge(r#box).any()
+    pub fn misses(&self, r#box: f32x4, row: f32) -> bool {
+        // Rounding of a part's row is far below one.
+        self.near - 1.0 > row || self.bounds.simd_ge(r#box).any()
     }
 
     /// Most optical depth that the line leaves in one texel.
     #[inline(always)]
     pub fn most(&self) -> f32 {
-        self.each * self.rate.abs().min(self.to - self.from)
+        self.each * least(self.rate.abs(), self.to - self.from)
     }
 
     /// How many parts it has.
@@ -186,8 +190,8 @@ impl Line {
         let axis = usize::from(self.step[1].abs() > self.step[0].abs());
         let (u, v) = ((low[axis] - self.origin[axis]) * self.rate, (high[axis] - self.origin[axis]) * self.rate);
         // Texels' edges are whole t, but for rounding.
-        let from = (u.min(v) + 0.01).max(0.0);
-        let to = (u.max(v) + 0.99).min(self.to + 1.0).max(0.0);
+        let from = most(least(u, v) + 0.01, 0.0);
+        let to = most(least(most(u, v) + 0.99, self.to + 1.0), 0.0);
         from as u32 as usize..to as u32 as usize
     }
 

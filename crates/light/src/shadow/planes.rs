@@ -50,32 +50,18 @@ impl Deposits {
             let part: Parts<L> = line.parts(k, edge, last);
             L::deposits(part.depth, part.y * L::splat(self.side) + part.x, &mut word);
             part.row.write_whole(&mut row);
+            if self.block.len() < self.next.len() + LANES {
+                self.block.resize(2 * self.block.len() + LANES, [0; BLOCK]);
+            }
+            let (block, end) = (&mut self.block[..], &mut self.end[..]);
             for (word, row) in word.iter().zip(&row).take(count - k) {
-                self.put(slices.level(*row), *word);
+                // Behind all points there is no list.
+                let Some(end) = end.get_mut(slices.level(*row)) else { continue };
+                let at = *end as usize;
+                block[at / BLOCK][at % BLOCK] = *word;
+                *end = if at % BLOCK == BLOCK - 1 { link(&mut self.next, at / BLOCK) } else { *end + 1 };
             }
         }
-    }
-
-    #[inline(always)]
-    fn put(&mut self, level: usize, word: u32) {
-        // Behind all points there is no list.
-        let Some(end) = self.end.get(level) else { return };
-        let at = *end as usize;
-        self.block[at / BLOCK][at % BLOCK] = word;
-        let next = if (at + 1) % BLOCK == 0 { self.grow(at / BLOCK) } else { at as u32 + 1 };
-        self.end[level] = next;
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn grow(&mut self, full: usize) -> u32 {
-        let new = self.next.len();
-        self.next[full] = new as u32;
-        self.next.push(0);
-        if self.block.len() <= new {
-            self.block.resize(2 * new, [0; BLOCK]);
-        }
-        (new * BLOCK) as u32
     }
 
     /// Adds what lies in a level to the texels of a map.
@@ -95,6 +81,16 @@ impl Deposits {
             block = self.next[block] as usize;
         }
     }
+}
+
+/// Takes another block to follow a full one; its beginning.
+#[cold]
+#[inline(never)]
+fn link(next: &mut Vec<u32>, full: usize) -> u32 {
+    let new = next.len() as u32;
+    next[full] = new;
+    next.push(0);
+    new * BLOCK as u32
 }
 
 /// Optical depth before some planes that follow each other, row by row of texels.

@@ -20,6 +20,30 @@ const MOST: f32 = 255.0;
 /// Bits of [`LEAST`].
 const BASE: u32 = (127 - 24) << 23;
 
+/// The smaller of two numbers, `b` if either is not one: one instruction, which `f32::min` is not.
+#[inline(always)]
+pub(crate) fn least(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// The larger of two numbers, `b` if either is not one.
+#[inline(always)]
+pub(crate) fn most(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// Asks for memory that is read soon, so that it is near by then; nothing depends on it.
+#[inline(always)]
+pub(crate) fn fetch<T>(v: Option<&T>) {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(v) = v {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: every x86-64 processor has the instruction, and the memory is there.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(v).cast()) }
+    }
+    let _ = v;
+}
+
 /// The depth in a word of [`Lanes::deposits`].
 #[inline(always)]
 pub(crate) fn depth_of(word: u32) -> f32 {

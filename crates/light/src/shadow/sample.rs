@@ -2,7 +2,7 @@
 
 use super::exp::exp_neg;
 use super::line::{Line, Parts};
-use super::registers::{LANES, Lanes};
+use super::registers::{LANES, Lanes, least, most};
 use super::slices::Slices;
 use wide::f32x4;
 
@@ -104,8 +104,8 @@ impl Around<'_> {
     /// and 0.027 in fur.
     #[inline(always)]
     pub fn light<L: Lanes, const PLANES: usize>(&self, window: &Window, own: &Own, taps: &mut Taps) -> f32 {
-        let least = self.read::<L, PLANES>(window, taps);
-        if PLANES == 1 && least > own.dark {
+        let lowest = self.read::<L, PLANES>(window, taps);
+        if PLANES == 1 && lowest > own.dark {
             return 0.0;
         }
         self.take::<L, PLANES>(window, own.lines, taps);
@@ -138,7 +138,7 @@ impl Around<'_> {
     fn read<L: Lanes, const PLANES: usize>(&self, window: &Window, taps: &mut Taps) -> f32 {
         let corner = window.y as usize * self.side + window.x as usize;
         let f = L::splat(self.f);
-        let mut least = [f32::MAX; LANES];
+        let mut lowest = [f32::MAX; LANES];
         for x in (0..window.across).step_by(LANES) {
             let mut low = L::splat(f32::MAX);
             for row in 0..window.down {
@@ -158,12 +158,12 @@ impl Around<'_> {
             if PLANES == 1 {
                 let mut each = [0.0; LANES];
                 low.write(&mut each);
-                for (least, v) in least.iter_mut().zip(each).take(window.across - x) {
-                    *least = least.min(v);
+                for (low, v) in lowest.iter_mut().zip(each).take(window.across - x) {
+                    *low = least(*low, v);
                 }
             }
         }
-        least.into_iter().fold(f32::MAX, f32::min)
+        lowest.into_iter().fold(f32::MAX, least)
     }
 
     /// Takes the hair's own lines out of the taps.
@@ -174,8 +174,11 @@ impl Around<'_> {
         let high = [low[0] + size[0], low[1] + size[1]];
         let around = f32x4::new([high[0], high[1], -low[0], -low[1]]);
         let (edge, end) = (L::splat(self.side as f32 - 0.5), L::splat(Slices::END));
+        // Of what lies behind the planes nothing was put in.
+        let last = self.plane + if PLANES == 4 { 2 } else { 1 };
+        let behind = self.slices.behind(last.min(self.slices.count()));
         let (mut place, mut row, mut depth) = ([0u32; LANES], [0u32; LANES], [0.0; LANES]);
-        for line in own.iter().filter(|l| !l.misses(around)) {
+        for line in own.iter().filter(|l| !l.misses(around, behind)) {
             let parts = line.within(low, high);
             for k in parts.clone().step_by(LANES) {
                 let part: Parts<L> = line.parts(k, edge, end);
@@ -204,9 +207,9 @@ impl Around<'_> {
             1 => plane + self.f,
             2 => plane + p as f32,
             // What stands for a plane that is not there is the one next to it.
-            _ => (plane + p as f32 - 1.0).max(0.0).min(self.slices.count() as f32),
+            _ => least(most(plane + p as f32 - 1.0, 0.0), self.slices.count() as f32),
         };
-        (seen + 1.0 - level).max(0.0).min(1.0)
+        least(most(seen + 1.0 - level, 0.0), 1.0)
     }
 }
 

@@ -1,10 +1,14 @@
 //! Where the slices of a tile lie.
 
+use super::registers::{least, most};
 use super::settings::Placement;
 
 /// Rows that the depths of a tile's points are divided into; a slice is a run of them. One is about a hair's width on a head
 /// of hair. With fewer, planes that lie close together where much hair does fall into one.
 pub(crate) const ROWS: usize = 4096;
+
+/// Length of a table by row: a power of two, so that no number has to be checked.
+const TABLE: usize = (ROWS + 2).next_power_of_two();
 
 /// Bins of the depth histogram.
 const BINS: usize = 256;
@@ -20,8 +24,8 @@ pub(crate) struct Slices {
     from: f32,
     /// Rows per depth.
     scale: f32,
-    /// Level of each row; the first lies before all points and the last behind them.
-    level: Vec<u16>,
+    /// Level of each row; the first lies before all points and the last behind them. What follows is not used.
+    level: Box<[u16; TABLE]>,
     /// First row of what lies behind each plane.
     plane: Vec<u16>,
     histogram: [u32; BINS],
@@ -29,7 +33,7 @@ pub(crate) struct Slices {
 
 impl Slices {
     pub fn new(count: usize) -> Slices {
-        let (level, plane) = (vec![0; ROWS + 2], vec![0; count + 1]);
+        let (level, plane) = (Box::new([0; TABLE]), vec![0; count + 1]);
         Slices { count, from: 0.0, scale: 1.0, level, plane, histogram: [0; BINS] }
     }
 
@@ -83,7 +87,7 @@ impl Slices {
     /// Row of a depth, from 1 on for what lies behind the first point; in front of it down to far below.
     #[inline(always)]
     pub fn row(&self, depth: f32) -> f32 {
-        ((depth - self.from) * self.scale + 1.0).max(-1e7).min(1e7)
+        least(most((depth - self.from) * self.scale + 1.0, -1e7), 1e7)
     }
 
     /// What rows are kept below to be looked up.
@@ -92,7 +96,7 @@ impl Slices {
     /// Level of the row, kept below [`Slices::END`].
     #[inline(always)]
     pub fn level(&self, row: u32) -> usize {
-        usize::from(self.level[row as usize])
+        usize::from(self.level[row as usize % TABLE])
     }
 
     /// True for what lies behind all points.
@@ -104,8 +108,14 @@ impl Slices {
     /// How many slices two rows are apart.
     #[inline(always)]
     pub fn between(&self, a: f32, b: f32) -> f32 {
-        let level = |row: f32| self.level(row.max(0.0).min(Slices::END) as u32);
+        let level = |row: f32| self.level(least(most(row, 0.0), Slices::END) as u32);
         level(a).abs_diff(level(b)) as f32
+    }
+
+    /// The first row that lies behind a plane.
+    #[inline(always)]
+    pub fn behind(&self, plane: usize) -> f32 {
+        f32::from(self.plane[plane]) + 1.0
     }
 
     /// The plane before a point of this depth, and how far it is between that and the next.
@@ -128,7 +138,7 @@ mod tests {
             let mut slices = Slices::new(count);
             let depths = || (0..1000).map(|i| 0.3 + 0.001 * (i % 37) as f32);
             slices.place(0.25, 0.75, placement, depths());
-            assert!(slices.level.windows(2).all(|w| w[0] <= w[1]));
+            assert!(slices.level[..ROWS + 2].windows(2).all(|w| w[0] <= w[1]));
             let (mut last, mut used) = (0.0, 0);
             for i in 0..=10_000 {
                 let z = 0.25 + 0.5 * i as f32 / 10_000.0;

@@ -4,7 +4,7 @@ use super::bins::{Chunk, Point, Segment};
 use super::line::Line;
 use super::planes::{Deposits, Planes};
 use super::project::Projection;
-use super::registers::{Kernel, Lanes, Width, run_at};
+use super::registers::{Kernel, fetch, Lanes, Width, run_at};
 use super::sample::{Around, Own, Taps, Window, dark};
 use super::settings::{Interpolation, ShadowSettings};
 use super::slices::Slices;
@@ -15,6 +15,9 @@ use std::sync::atomic::{AtomicU32, Ordering};
 /// Points that are read ahead of their use: lists jump about in memory, and loads that do not wait for each other
 /// overlap.
 const AHEAD: usize = 64;
+
+/// Points ahead for which memory is asked for.
+const SOON: usize = 3;
 
 /// What one thread needs for its tiles.
 pub(crate) struct Work<'a> {
@@ -212,6 +215,18 @@ impl<'a> Work<'a> {
         }
     }
 
+    /// Asks for what the points after the `i`th need: their order jumps about in memory.
+    #[inline(always)]
+    fn ask(&self, i: usize) {
+        let receiver = |ahead: usize| self.order.get(i + ahead).map(|r| &self.receiver[*r as usize]);
+        fetch(receiver(3 * SOON));
+        fetch(receiver(2 * SOON).map(|r| &self.run[r.strand as usize]));
+        if let Some(r) = receiver(SOON) {
+            let from = self.run[r.strand as usize].from as usize;
+            (from..from + 3).for_each(|l| fetch(self.line.get(l)));
+        }
+    }
+
     /// Gives points their values, plane after plane; how many are behind solids.
     #[inline(always)]
     fn receive<L: Lanes, const PLANES: usize>(&mut self, layers: &[ShadowHair], cells: &[Vec<AtomicU32>]) -> usize {
@@ -223,8 +238,9 @@ impl<'a> Work<'a> {
                 continue;
             }
             self.planes.go(&self.deposits, k);
-            for i in &self.order[range] {
-                let r = &self.receiver[*i as usize];
+            for i in range {
+                self.ask(i);
+                let r = &self.receiver[self.order[i] as usize];
                 self.window.put::<L>(r.at[0], r.at[1], self.projection.filter);
                 let run = &self.run[r.strand as usize];
                 let own = Own { lines: &self.line[run.from as usize..run.to as usize], dark: run.dark };
