@@ -4,7 +4,7 @@ use super::bins::{Chunk, Point, Segment};
 use super::line::Line;
 use super::planes::{Deposits, Planes};
 use super::project::Projection;
-use super::registers::{Kernel, fetch, Lanes, Width, run_at};
+use super::registers::{Kernel, Lanes, Width, fetch, run_at};
 use super::sample::{Around, Own, Taps, Window, dark};
 use super::settings::{Interpolation, ShadowSettings};
 use super::slices::Slices;
