@@ -1,6 +1,6 @@
 //! One tile of a map: spreads its segments, samples its points.
 
-use super::bins::{Chunk, Point, Segment};
+use super::bins::{Chunk, Segment};
 use super::line::Line;
 use super::planes::{Deposits, Planes};
 use super::project::Projection;
@@ -12,9 +12,8 @@ use super::solid::{self, Cover, Solid};
 use super::{ShadowHair, TILE};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Points that are read ahead of their use: lists jump about in memory, and loads that do not wait for each other
-/// overlap.
-const AHEAD: usize = 64;
+/// Points ahead for which memory is asked for: lists jump about in memory.
+const AHEAD: usize = 24;
 
 /// Points ahead for which memory is asked for.
 const SOON: usize = 3;
@@ -270,31 +269,29 @@ impl<'a> Work<'a> {
         let shift = |p: [f32; 3]| [p[0] - low[0], p[1] - low[1], p[2]];
         let top = self.projection.texels as f32 - 0.001;
         let side = self.side as f32;
-        let mut word = [0u32; AHEAD];
-        for chunk in chunks {
-            for list in chunk.tile(t).chunks(AHEAD) {
-                for (w, &k) in word.iter_mut().zip(list) {
-                    *w = chunk.point[k as usize].word();
+        let point = |chunk: usize, i: usize| chunks.get(chunk).and_then(|c| c.point.get(*c.tile(t).get(i)? as usize));
+        for (c, chunk) in chunks.iter().enumerate() {
+            (0..AHEAD).for_each(|i| fetch(point(c + 1, i)));
+            let list = chunk.tile(t);
+            for (i, &k) in list.iter().enumerate() {
+                fetch(list.get(i + AHEAD).map(|k| &chunk.point[*k as usize]));
+                let k = k as usize;
+                let strand = chunk.point[k].strand();
+                if chunk.point[k].receives() {
+                    let p = chunk.point[k].at;
+                    let p = [p[0].clamp(0.0, top), p[1].clamp(0.0, top), p[2]];
+                    let inside = |i: usize| (p[i] * (1.0 / TILE as f32)) as usize == place[i];
+                    if inside(0) && inside(1) {
+                        from = from.min(p[2]);
+                        to = to.max(p[2]);
+                        let point = (chunk.first + k) as u32;
+                        let (layer, clear) = (chunk.layer as u32, self.cover.is_clear(p));
+                        self.receiver.push(Receiver { at: shift(p), plane: 0, strand, layer, point, clear });
+                    }
                 }
-                for (&w, &k) in word.iter().zip(list) {
-                    let k = k as usize;
-                    let strand = Point::strand_of(w);
-                    if Point::receives_of(w) {
-                        let p = chunk.point[k].at;
-                        let p = [p[0].clamp(0.0, top), p[1].clamp(0.0, top), p[2]];
-                        let inside = |i: usize| (p[i] * (1.0 / TILE as f32)) as usize == place[i];
-                        if inside(0) && inside(1) {
-                            from = from.min(p[2]);
-                            to = to.max(p[2]);
-                            let point = (chunk.first + k) as u32;
-                            let (layer, clear) = (chunk.layer as u32, self.cover.is_clear(p));
-                            self.receiver.push(Receiver { at: shift(p), plane: 0, strand, layer, point, clear });
-                        }
-                    }
-                    if let Some(s) = chunk.segment(k, &layers[chunk.layer], self.projection) {
-                        let s = Segment { a: shift(s.a), b: shift(s.b), ..s };
-                        self.segment.extend(s.over(side).map(|segment| Cast { segment, strand }));
-                    }
+                if let Some(s) = chunk.segment(k, &layers[chunk.layer], self.projection) {
+                    let s = Segment { a: shift(s.a), b: shift(s.b), ..s };
+                    self.segment.extend(s.over(side).map(|segment| Cast { segment, strand }));
                 }
             }
         }
