@@ -29,24 +29,11 @@ pub(crate) struct Point {
 
 impl Point {
     pub fn strand(&self) -> u32 {
-        Point::strand_of(self.strand)
+        self.strand & !RECEIVES
     }
 
     pub fn receives(&self) -> bool {
-        Point::receives_of(self.strand)
-    }
-
-    pub fn strand_of(word: u32) -> u32 {
-        word & !RECEIVES
-    }
-
-    pub fn receives_of(word: u32) -> bool {
-        word & RECEIVES != 0
-    }
-
-    /// Both in one word, to be read ahead.
-    pub fn word(&self) -> u32 {
-        self.strand
+        self.strand & RECEIVES != 0
     }
 }
 

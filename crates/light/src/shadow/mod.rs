@@ -1,10 +1,11 @@
 //! Opacity shadow maps: how much light of a source reaches every point of every hair, past other hairs and solids.
 //!
 //! The method is Kim's (opacity shadow maps, SIGGRAPH 2003 course notes, §4) cut into tiles: the plane across the light
-//! is divided into squares of `TILE` texels, the hair segments are sorted into them, and each tile sums optical depth
-//! into slices of its own, samples its own points and is forgotten. Tiles are independent, so the bytes are the same
-//! for any number of threads, and memory is 32 bytes a point, about 7 a segment and one tile a thread, whatever the
-//! resolution times the slices.
+//! is divided into squares of `TILE` texels, the hair segments are sorted into them, and each tile sorts what they leave in
+//! its texels by slices of its own, then goes from plane to plane away from the light: adds up optical depth, samples the
+//! points behind the plane, and forgets. Tiles are independent, so the bytes are the same for any number of threads, and
+//! memory is 32 bytes a point, about 7 a segment and one tile a thread (4 bytes a deposit, about one a texel that a hair
+//! crosses), whatever the resolution times the slices.
 //!
 //! A point's own hair is taken out of its footprint by the same deposits that put it in, so no bias in depth is needed.
 //! Solids are met by a ray from the point itself, so their shadows are sharp and exact (points that lie before all that
@@ -17,11 +18,16 @@ mod bins;
 mod exact;
 mod exp;
 mod line;
+mod planes;
 mod project;
+mod registers;
+#[cfg(test)]
+mod registers_tests;
+mod sample;
 mod settings;
+mod slices;
 mod solid;
 mod tile;
-mod volume;
 
 pub use exact::{Footprint, Sample, ShadowError, transmittance_exact};
 pub use settings::{Interpolation, MEASURED, Measured, Placement, Quality, ShadowSettings, for_error};
@@ -34,9 +40,9 @@ use project::{Projection, fit};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Side of a tile, texels. A tile's slices should stay in the second-level cache: 36 x 36 texels with their border and
-/// 128 slices are 660 KB. Much smaller tiles repeat segments that cross their borders.
-pub(crate) const TILE: usize = 32;
+/// Side of a tile, texels. Half of it repeats the work of twice as many segments that cross borders (a quarter more time);
+/// twice as much no longer lets a tile's deposits and planes stay in the second-level cache.
+pub(crate) const TILE: usize = 64;
 
 /// Where light comes from: world space, scene units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -167,22 +173,19 @@ fn face(
         }
     }
     let cover = solid::Cover::new(solids, projection);
-    let (worked, hidden) = (0..grid * grid)
+    let done = (0..grid * grid)
         .into_par_iter()
         .map_init(
             || tile::Work::new(projection, settings, solids, &cover),
-            |work, t| match work.run(&chunks, layers, [t % grid, t / grid], t, cells) {
-                Some(hidden) => (1, hidden),
-                None => (0, 0),
-            },
+            |work, t| work.run(&chunks, layers, [t % grid, t / grid], t, cells),
         )
-        .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
-    counts.behind_solid += hidden;
+        .reduce(tile::Done::default, tile::Done::and);
+    counts.behind_solid += done.hidden;
     counts.texels = projection.texels;
-    counts.tiles[0] += worked;
+    counts.tiles[0] += done.tiles;
     counts.tiles[1] += grid * grid;
     let held: usize = chunks.iter().map(Chunk::bytes).sum();
-    counts.bytes = counts.bytes.max(held + volume::Volume::bytes(projection.filter, settings.slices));
+    counts.bytes = counts.bytes.max(held + done.bytes);
 }
 
 impl ShadowHair<'_> {

@@ -1,43 +1,22 @@
-//! One tile of a map: fills its volume, samples its points.
+//! One tile of a map: spreads its segments, samples its points.
 
-use super::bins::{Chunk, Point, Segment};
+use super::bins::{Chunk, Segment};
 use super::line::Line;
+use super::planes::{Deposits, Planes};
 use super::project::Projection;
-use super::settings::{Placement, ShadowSettings};
+use super::registers::{Kernel, Lanes, Width, fetch, run_at};
+use super::sample::{Around, Own, Taps, Window, dark};
+use super::settings::{Interpolation, ShadowSettings};
+use super::slices::Slices;
 use super::solid::{self, Cover, Solid};
-use super::volume::{Own, Taps, Volume, Window};
 use super::{ShadowHair, TILE};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Bins of the depth histogram.
-const BINS: usize = 256;
+/// Points ahead for which memory is asked for: lists jump about in memory.
+const AHEAD: usize = 24;
 
-/// Part of the slices that is spread evenly whatever the histogram says: without it a few hairs far from the rest share
-/// one slice.
-const EVEN: f32 = 0.25;
-
-/// Points that are read ahead of their use: lists jump about in memory, and loads that do not wait for each other
-/// overlap.
-const AHEAD: usize = 64;
-
-/// Times that a segment is halved until it is straight in slices.
-const SPLITS: u32 = 5;
-
-/// Slices that the middle of a segment may be off by: more puts hair before its neighbour that lies behind it.
-const STRAIGHT: f32 = 0.25;
-
-/// Hands out a segment in pieces whose depths are right between their ends too when `at` puts them into slices; `a` and `b`
-/// are the slices of its own ends.
-fn straighten(s: Segment, [a, b]: [f32; 2], at: &impl Fn(f32) -> f32, splits: u32, emit: &mut impl FnMut(Segment)) {
-    let middle: [f32; 3] = std::array::from_fn(|i| 0.5 * (s.a[i] + s.b[i]));
-    let m = at(middle[2]);
-    if splits > 0 && (m - 0.5 * (a + b)).abs() > STRAIGHT {
-        straighten(Segment { b: middle, ..s }, [a, m], at, splits - 1, emit);
-        straighten(Segment { a: middle, ..s }, [m, b], at, splits - 1, emit);
-    } else {
-        emit(Segment { a: [s.a[0], s.a[1], a], b: [s.b[0], s.b[1], b], ..s });
-    }
-}
+/// Points ahead for which memory is asked for.
+const SOON: usize = 3;
 
 /// What one thread needs for its tiles.
 pub(crate) struct Work<'a> {
@@ -45,33 +24,85 @@ pub(crate) struct Work<'a> {
     settings: &'a ShadowSettings,
     solids: &'a [Solid<'a>],
     cover: &'a Cover,
-    /// Points of the tile behind solids.
-    hidden: usize,
-    volume: Volume,
+    width: Width,
+    /// Texels along a side, with the border.
+    side: usize,
+    slices: Slices,
+    deposits: Deposits,
+    planes: Planes,
     segment: Vec<Cast>,
-    /// Room for segments while they are cut where slices change their distances.
-    bent: Vec<Cast>,
     receiver: Vec<Receiver>,
+    /// Lines of the hairs that have points here, and where those of each hair lie.
     line: Vec<Line>,
-    warp: Vec<f32>,
+    run: Vec<Run>,
+    /// Receivers by the plane before them: plane k has `order[start[k]..start[k + 1]]`.
+    order: Vec<u32>,
+    start: Vec<u32>,
     taps: Taps,
     window: Window,
 }
 
-/// A segment in texels of the volume and the strand it is of.
+/// A segment in texels of the tile and the strand it is of.
 struct Cast {
     segment: Segment,
     strand: u32,
 }
 
 /// A point whose value the tile gives.
+#[derive(Clone, Copy)]
 struct Receiver {
+    /// Texels, and depth; then how far it is from its plane to the next.
     at: [f32; 3],
+    /// The plane before it.
+    plane: u32,
+    /// Strand; then its place in the list of runs.
     strand: u32,
     layer: u32,
     point: u32,
     /// No solid lies between it and the light.
     clear: bool,
+}
+
+/// A strand's lines, and the optical depth from which on no light is left.
+struct Run {
+    from: u32,
+    to: u32,
+    dark: f32,
+}
+
+/// What came of a tile.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Done {
+    /// 1 if the tile had points.
+    pub tiles: usize,
+    /// Points behind solids.
+    pub hidden: usize,
+    /// Memory of the tile.
+    pub bytes: usize,
+}
+
+impl Done {
+    /// Of two parts of the work.
+    pub fn and(self, o: Done) -> Done {
+        let bytes = self.bytes.max(o.bytes);
+        Done { tiles: self.tiles + o.tiles, hidden: self.hidden + o.hidden, bytes }
+    }
+}
+
+/// Spreads and samples at some width.
+struct Spread<'w, 'a>(&'w mut Work<'a>, &'w [ShadowHair<'w>], &'w [Vec<AtomicU32>]);
+
+impl Kernel for Spread<'_, '_> {
+    type Out = usize;
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> usize {
+        self.0.fill::<L>();
+        match self.0.settings.interpolation {
+            Interpolation::OpticalDepth => self.0.receive::<L, 1>(self.1, self.2),
+            Interpolation::Transmittance => self.0.receive::<L, 2>(self.1, self.2),
+            Interpolation::Cubic => self.0.receive::<L, 4>(self.1, self.2),
+        }
+    }
 }
 
 impl<'a> Work<'a> {
@@ -86,19 +117,23 @@ impl<'a> Work<'a> {
             settings,
             solids,
             cover,
-            hidden: 0,
-            volume: Volume::new(projection.filter, settings.slices),
+            width: Width::widest(),
+            side: TILE + 2 * projection.border(),
+            slices: Slices::new(settings.slices),
+            deposits: Deposits::new(),
+            planes: Planes::new(),
             segment: Vec::new(),
-            bent: Vec::new(),
             receiver: Vec::new(),
             line: Vec::new(),
-            warp: Vec::new(),
+            run: Vec::new(),
+            order: Vec::new(),
+            start: Vec::new(),
             taps: Taps::new(),
             window: Window::new(),
         }
     }
 
-    /// Works tile `t` at `place`; how many of its points are behind solids; `None` if it has nothing to give.
+    /// Works tile `t` at `place`.
     pub fn run(
         &mut self,
         chunks: &[Chunk],
@@ -106,45 +141,122 @@ impl<'a> Work<'a> {
         place: [usize; 2],
         t: usize,
         cells: &[Vec<AtomicU32>],
-    ) -> Option<usize> {
-        let [from, to] = self.gather(chunks, layers, place, t)?;
-        self.hidden = 0;
-        self.place_slices(from, to);
-        self.volume.clear();
-        self.line.clear();
-        // Segments and receivers are in the same order of strands.
-        let (mut s, mut r) = (0, 0);
-        let mut runs = Vec::new();
-        while r < self.receiver.len() {
-            let strand = self.receiver[r].strand;
-            let first = r;
-            while r < self.receiver.len() && self.receiver[r].strand == strand {
-                r += 1;
-            }
-            self.fill(&mut s, |other| other < strand);
-            let line = self.line.len();
-            self.fill(&mut s, |other| other == strand);
-            runs.push((first..r, line..self.line.len()));
-        }
-        self.fill(&mut s, |_| true);
-        self.volume.sum();
-        for (receivers, lines) in runs {
-            self.receive(receivers, lines, layers, cells);
-        }
-        Some(self.hidden)
+    ) -> Done {
+        let Some([from, to]) = self.gather(chunks, layers, place, t) else { return Done::default() };
+        let middles = self.segment.iter().map(|Cast { segment: s, .. }| 0.5 * (s.a[2] + s.b[2]));
+        self.slices.place(from, to, self.settings.placement, middles);
+        self.deposits.clear(self.side, self.settings.slices);
+        let hidden = run_at(self.width, Spread(self, layers, cells));
+        Done { tiles: 1, hidden, bytes: self.bytes() }
     }
 
-    /// Puts segments from `next` on into the volume while their strand is of a kind.
-    fn fill(&mut self, next: &mut usize, of: impl Fn(u32) -> bool) {
-        while let Some(own) = self.segment.get(*next)
-            && of(own.strand)
-        {
-            Line::of(&own.segment, self.volume.side(), self.settings.slices, |l| {
-                self.volume.add(&l);
-                self.line.push(l);
-            });
-            *next += 1;
+    /// Memory in use.
+    fn bytes(&self) -> usize {
+        let lists = size_of::<Cast>() * self.segment.len()
+            + (size_of::<Receiver>() + 4) * self.receiver.len()
+            + size_of::<Line>() * self.line.len();
+        lists + self.deposits.bytes() + Planes::bytes(self.side)
+    }
+
+    /// Spreads all segments, keeps the lines of strands that have points here, and sorts the points by planes.
+    #[inline(always)]
+    fn fill<L: Lanes>(&mut self) {
+        let Work { segment, receiver, line, run, slices, deposits, .. } = self;
+        line.clear();
+        run.clear();
+        let side = self.side as f32;
+        // Segments and receivers are in the same order of strands.
+        let mut r = 0;
+        let mut s = 0;
+        while s < segment.len() {
+            let strand = segment[s].strand;
+            while r < receiver.len() && receiver[r].strand < strand {
+                r = name(receiver, r, run, Run { from: 0, to: 0, dark: dark(&[]) });
+            }
+            let keep = r < receiver.len() && receiver[r].strand == strand;
+            let from = line.len();
+            while s < segment.len() && segment[s].strand == strand {
+                Line::of(&segment[s].segment, side, slices, |l| line.push(l));
+                s += 1;
+            }
+            for l in &line[from..] {
+                deposits.add::<L>(l, slices);
+            }
+            if !keep {
+                line.truncate(from);
+            } else {
+                let dark = dark(&line[from..]);
+                r = name(receiver, r, run, Run { from: from as u32, to: line.len() as u32, dark });
+            }
         }
+        while r < receiver.len() {
+            r = name(receiver, r, run, Run { from: 0, to: 0, dark: dark(&[]) });
+        }
+        let (order, start) = (&mut self.order, &mut self.start);
+        start.clear();
+        start.resize(slices.count() + 1, 0);
+        for r in receiver.iter_mut() {
+            let (plane, f) = slices.point(r.at[2]);
+            (r.plane, r.at[2]) = (plane as u32, f);
+            start[plane + 1] += 1;
+        }
+        for k in 0..slices.count() {
+            start[k + 1] += start[k];
+        }
+        order.clear();
+        order.resize(receiver.len(), 0);
+        // From the end on, so that starts of lists are left.
+        let mut next = start.clone();
+        for (i, r) in receiver.iter().enumerate() {
+            let at = &mut next[r.plane as usize];
+            order[*at as usize] = i as u32;
+            *at += 1;
+        }
+    }
+
+    /// Asks for what the points after the `i`th need: their order jumps about in memory.
+    #[inline(always)]
+    fn ask(&self, i: usize) {
+        let receiver = |ahead: usize| self.order.get(i + ahead).map(|r| &self.receiver[*r as usize]);
+        fetch(receiver(3 * SOON));
+        fetch(receiver(2 * SOON).map(|r| &self.run[r.strand as usize]));
+        if let Some(r) = receiver(SOON) {
+            let from = self.run[r.strand as usize].from as usize;
+            (from..from + 3).for_each(|l| fetch(self.line.get(l)));
+        }
+    }
+
+    /// Gives points their values, plane after plane; how many are behind solids.
+    #[inline(always)]
+    fn receive<L: Lanes, const PLANES: usize>(&mut self, layers: &[ShadowHair], cells: &[Vec<AtomicU32>]) -> usize {
+        let mut hidden = 0;
+        self.planes.begin(&self.deposits, self.side, if PLANES == 4 { 2 } else { 1 }, self.slices.count());
+        for k in 0..self.slices.count() {
+            let range = self.start[k] as usize..self.start[k + 1] as usize;
+            if range.is_empty() {
+                continue;
+            }
+            self.planes.go(&self.deposits, k);
+            for i in range {
+                self.ask(i);
+                let r = &self.receiver[self.order[i] as usize];
+                self.window.put::<L>(r.at[0], r.at[1], self.projection.filter);
+                let run = &self.run[r.strand as usize];
+                let own = Own { lines: &self.line[run.from as usize..run.to as usize], dark: run.dark };
+                let (map, f) = (self.planes.maps(), r.at[2]);
+                let around = Around { map, side: self.side, plane: k, f, slices: &self.slices };
+                let mut light = around.light::<L, PLANES>(&self.window, &own, &mut self.taps);
+                if !r.clear && light > 0.0 {
+                    let p = layers[r.layer as usize].point(r.point as usize);
+                    if solid::is_hidden(self.solids, p, self.projection) {
+                        light = 0.0;
+                        hidden += 1;
+                    }
+                }
+                cells[r.layer as usize][r.point as usize].store(light.to_bits(), Ordering::Relaxed);
+            }
+        }
+        hidden
     }
 
     /// Lists what the tile has, in texels of the volume; the depths of its first and last receiver.
@@ -156,110 +268,45 @@ impl<'a> Work<'a> {
         let (mut from, mut to) = (f32::INFINITY, f32::NEG_INFINITY);
         let shift = |p: [f32; 3]| [p[0] - low[0], p[1] - low[1], p[2]];
         let top = self.projection.texels as f32 - 0.001;
-        let side = self.volume.side() as f32;
-        let mut word = [0u32; AHEAD];
-        for chunk in chunks {
-            for list in chunk.tile(t).chunks(AHEAD) {
-                for (w, &k) in word.iter_mut().zip(list) {
-                    *w = chunk.point[k as usize].word();
+        let side = self.side as f32;
+        let point = |chunk: usize, i: usize| chunks.get(chunk).and_then(|c| c.point.get(*c.tile(t).get(i)? as usize));
+        for (c, chunk) in chunks.iter().enumerate() {
+            (0..AHEAD).for_each(|i| fetch(point(c + 1, i)));
+            let list = chunk.tile(t);
+            for (i, &k) in list.iter().enumerate() {
+                fetch(list.get(i + AHEAD).map(|k| &chunk.point[*k as usize]));
+                let k = k as usize;
+                let strand = chunk.point[k].strand();
+                if chunk.point[k].receives() {
+                    let p = chunk.point[k].at;
+                    let p = [p[0].clamp(0.0, top), p[1].clamp(0.0, top), p[2]];
+                    let inside = |i: usize| (p[i] * (1.0 / TILE as f32)) as usize == place[i];
+                    if inside(0) && inside(1) {
+                        from = from.min(p[2]);
+                        to = to.max(p[2]);
+                        let point = (chunk.first + k) as u32;
+                        let (layer, clear) = (chunk.layer as u32, self.cover.is_clear(p));
+                        self.receiver.push(Receiver { at: shift(p), plane: 0, strand, layer, point, clear });
+                    }
                 }
-                for (&w, &k) in word.iter().zip(list) {
-                    let k = k as usize;
-                    let strand = Point::strand_of(w);
-                    if Point::receives_of(w) {
-                        let p = chunk.point[k].at;
-                        let p = [p[0].clamp(0.0, top), p[1].clamp(0.0, top), p[2]];
-                        let inside = |i: usize| (p[i] * (1.0 / TILE as f32)) as usize == place[i];
-                        if inside(0) && inside(1) {
-                            from = from.min(p[2]);
-                            to = to.max(p[2]);
-                            let point = (chunk.first + k) as u32;
-                            let (layer, clear) = (chunk.layer as u32, self.cover.is_clear(p));
-                            self.receiver.push(Receiver { at: shift(p), strand, layer, point, clear });
-                        }
-                    }
-                    if let Some(s) = chunk.segment(k, &layers[chunk.layer], self.projection) {
-                        let s = Segment { a: shift(s.a), b: shift(s.b), ..s };
-                        self.segment.extend(s.over(side).map(|segment| Cast { segment, strand }));
-                    }
+                if let Some(s) = chunk.segment(k, &layers[chunk.layer], self.projection) {
+                    let s = Segment { a: shift(s.a), b: shift(s.b), ..s };
+                    self.segment.extend(s.over(side).map(|segment| Cast { segment, strand }));
                 }
             }
         }
         (from <= to).then_some([from, to])
     }
+}
 
-    /// Places the slices between depths `from` and `to`, and turns depths into slice coordinates.
-    fn place_slices(&mut self, from: f32, to: f32) {
-        let slices = self.settings.slices as f32;
-        // Points of one depth still lie behind what is nearer the light.
-        let scale = BINS as f32 / (to - from).max(1e-6 * from.abs().max(to.abs())).max(1e-30);
-        self.warp.clear();
-        match self.settings.placement {
-            Placement::Uniform => self.warp.extend((0..=BINS).map(|b| b as f32 * slices / BINS as f32)),
-            Placement::Histogram => {
-                let mut count = [0u32; BINS];
-                for Cast { segment: s, .. } in &self.segment {
-                    let b = (0.5 * (s.a[2] + s.b[2]) - from) * scale;
-                    if b >= 0.0 && b < BINS as f32 {
-                        count[b as usize] += 1;
-                    }
-                }
-                let all = count.iter().sum::<u32>().max(1) as f32;
-                let mut sum = 0.0;
-                self.warp.push(0.0);
-                for c in count {
-                    sum += (1.0 - EVEN) * c as f32 / all + EVEN / BINS as f32;
-                    self.warp.push(sum);
-                }
-                let end = slices / sum;
-                self.warp.iter_mut().for_each(|v| *v *= end);
-            }
-        }
-        let warp = &self.warp;
-        let at = |z: f32| {
-            let b = (z - from) * scale;
-            if b < 0.0 {
-                b.max(-1e6)
-            } else if b >= BINS as f32 {
-                slices + (b - BINS as f32).min(1e6)
-            } else {
-                let i = b as usize;
-                warp[i] + (warp[i + 1] - warp[i]) * (b - i as f32)
-            }
-        };
-        self.bent.clear();
-        for Cast { segment, strand } in &self.segment {
-            let mut emit = |segment| self.bent.push(Cast { segment, strand: *strand });
-            straighten(*segment, [at(segment.a[2]), at(segment.b[2])], &at, SPLITS, &mut emit);
-        }
-        std::mem::swap(&mut self.segment, &mut self.bent);
-        for r in &mut self.receiver {
-            r.at[2] = at(r.at[2]);
-        }
+/// Gives the receivers from `first` on that are of its strand their run; the first of the next strand.
+fn name(receiver: &mut [Receiver], first: usize, run: &mut Vec<Run>, lines: Run) -> usize {
+    let strand = receiver[first].strand;
+    let mut r = first;
+    while r < receiver.len() && receiver[r].strand == strand {
+        receiver[r].strand = run.len() as u32;
+        r += 1;
     }
-
-    /// Gives points of one strand their values.
-    fn receive(
-        &mut self,
-        receivers: std::ops::Range<usize>,
-        lines: std::ops::Range<usize>,
-        layers: &[ShadowHair],
-        cells: &[Vec<AtomicU32>],
-    ) {
-        let interpolation = self.settings.interpolation;
-        let own = Own::new(&self.line[lines]);
-        for r in &self.receiver[receivers] {
-            let window = &mut self.window;
-            window.put(r.at[0], r.at[1], self.projection.filter);
-            let mut light = self.volume.sample(window, r.at[2], &own, &mut self.taps, interpolation);
-            if !r.clear && light > 0.0 {
-                let p = layers[r.layer as usize].point(r.point as usize);
-                if solid::is_hidden(self.solids, p, self.projection) {
-                    light = 0.0;
-                    self.hidden += 1;
-                }
-            }
-            cells[r.layer as usize][r.point as usize].store(light.to_bits(), Ordering::Relaxed);
-        }
-    }
+    run.push(lines);
+    r
 }
