@@ -77,9 +77,11 @@ fn main() {
         ("default", default),
         ("uniform", ShadowSettings { placement: Placement::Uniform, ..default }),
         ("fine", Quality::Fine.settings()),
-        ("", of(1024, 384)),
+        ("", of(512, 128)),
+        ("", of(1024, 128)),
         ("", of(2048, 64)),
-        ("", of(2048, 384)),
+        ("", of(2048, 128)),
+        ("", of(2048, 512)),
         ("", of(4096, 256)),
     ] {
         println!("{name:8} {}", measure(&settings).line());

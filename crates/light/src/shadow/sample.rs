@@ -185,7 +185,8 @@ impl Around<'_> {
                 // From one row and column before the window to one behind it.
                 let x = (part.x - L::splat(low[0])).max(L::splat(-1.0)).min(L::splat(size[0]));
                 let y = (part.y - L::splat(low[1])).max(L::splat(-1.0)).min(L::splat(size[1])) + L::splat(1.0);
-                (y * L::splat(ROW as f32) + x).write_whole(&mut place);
+                // What lies before both the first row and the first column counts nowhere, as the row before the window.
+                (y * L::splat(ROW as f32) + x).max(L::splat(0.0)).write_whole(&mut place);
                 part.row.write_whole(&mut row);
                 part.depth.write(&mut depth);
                 for i in 0..(parts.end - k).min(LANES) {

@@ -96,7 +96,7 @@ pub(super) mod version {
     pub const LOOK: u32 = 2;
     pub const COLLISION: u32 = 2;
     pub const AREAS: u32 = 1;
-    pub const SHADOW: u32 = 1;
+    pub const SHADOW: u32 = 2;
     pub const EXPORT: u32 = 1;
     pub const PREVIEW: u32 = 3;
 }
