@@ -3,8 +3,10 @@
 use crate::mesh::corners;
 use crate::{NONE, SurfacePoint, Topology, Vec3};
 use rayon::prelude::*;
+use std::sync::OnceLock;
 
 mod bound;
+mod folds;
 mod lids;
 mod ray;
 
@@ -63,6 +65,8 @@ pub struct Bvh {
     lids: u32,
     /// Vertices of lids.
     rim: Vec<bool>,
+    /// Where the mesh runs through itself; found when first asked for.
+    folds: OnceLock<folds::Folds>,
 }
 
 /// Two children, side by side in one cache line.
@@ -138,11 +142,18 @@ impl Bvh {
             open,
             lids: NONE,
             rim: Vec::new(),
+            folds: OnceLock::new(),
         }
     }
 
     /// Closest point; `None` for an empty mesh or if nothing is nearer than `limit`. Ties go to the lowest triangle.
     pub fn closest(&self, query: Vec3, limit: f64) -> Option<Closest> {
+        self.closest_hit(query, limit).map(|(slot, hit)| self.signed(query, slot, &hit))
+    }
+
+    /// Closest place: its slot and where on that triangle.
+    #[inline(always)]
+    fn closest_hit(&self, query: Vec3, limit: f64) -> Option<(usize, Hit)> {
         // Max and min pass over NaN, so that it would come near everything.
         if query.iter().chain([&limit]).any(|x| x.is_nan()) {
             return None;
@@ -163,7 +174,7 @@ impl Bvh {
                 square
             },
         );
-        best.map(|(slot, hit)| self.signed(query, slot, &hit))
+        best
     }
 
     /// Visits the triangles of all leaves within `reach` by the `distance` of their boxes, near ones first. A visit takes a

@@ -14,12 +14,18 @@
 //! The nearest way out of where it is drawn would be another one from frame to frame where skin is thick.
 //!
 //! **Inside** is decided along every segment, not at samples. Signed distance changes by at most the way gone, so nothing
-//! within d of a point at distance d is inside; where that says nothing, a ray does.
+//! within d of a point at distance d is inside; where that says nothing, a ray does. Where the skin runs through itself (a
+//! thigh in the belly) the nearest skin may not lead out; what is inside and the nearest way out are then those of all of it
+//! ([`Bvh::closest_outside`]), and hair that **grows inside** (its root is in such a fold) is left as it is up to the place
+//! where it comes out, if it does.
 
-use crate::push_up::{PushUp, drape};
+use crate::push_up::{PushUp, around, drape};
 use pelage_geom::motion::RigidTransform;
 use pelage_geom::{Bvh, Offsets, Vec3};
+use probe::{Ahead, Probe, SHALLOW};
 use rayon::prelude::*;
+
+mod probe;
 
 /// Part of its length by which a segment may be stretched or shortened. At 0 every push reaches the tip; at 0.05 a pushed
 /// hair looks longer than its neighbours.
@@ -41,13 +47,6 @@ const TRIES: usize = 6;
 /// degrees at its root; at 1000 none of a short hair is as clear as it should be.
 const RAMP: f64 = 100.0;
 
-/// Distance in steps beyond which a bound is asked for before the distance. At 1 both are asked for near the skin; at 20
-/// the distance is, where it is dear.
-const FAR: f64 = 4.0;
-
-/// Part of `held` down to which a root may lie in the skin for the rest of that length to be enough to get out.
-const SHALLOW: f64 = 0.75;
-
 /// Depth in steps beyond which hair goes in strides. At 0 all hair does, for three times the time and nothing gained; at 10
 /// hair a centimetre deep in an arm changes sides from frame to frame.
 const DEEP: f64 = 2.0;
@@ -62,6 +61,10 @@ const AROUND: usize = 1;
 
 /// Sweeps after a stride, which moves hair little.
 const STRIDE_SWEEPS: usize = 8;
+
+/// Factor by which a hair without room gets shorter until it is clear. At 0.95 it takes six times as many looks; at 0.5 it
+/// ends up at half the room.
+const SHORTER: f64 = 0.8;
 
 /// Settings of [`depenetrate`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,11 +83,14 @@ pub struct Depenetrate {
 pub struct DepenetrateCounts {
     /// Hairs that were moved.
     pub pushed: usize,
+    /// Of these, hairs that have no room at their length: they are straight and as long as there is room.
+    pub shortened: usize,
     /// Hairs that are still inside somewhere. Those moved have the best shape that was found.
     pub uncleared: usize,
-    /// Of these, hairs whose root lies too deep for the held length to reach the surface.
+    /// Of these, hairs whose root lies too deep for the held length to reach the surface: it was put there, or grows where
+    /// another part of the skin covers it.
     pub buried: usize,
-    /// Greatest depth of a sample before and after, scene units.
+    /// Greatest depth of a sample before and after, scene units; of hairs that grow inside only where they are out again.
     pub deepest: [f64; 2],
     /// Longest way that a point was moved, scene units.
     pub moved: f64,
@@ -97,6 +103,7 @@ impl DepenetrateCounts {
     pub fn and(self, other: Self) -> Self {
         DepenetrateCounts {
             pushed: self.pushed + other.pushed,
+            shortened: self.shortened + other.shortened,
             uncleared: self.uncleared + other.uncleared,
             buried: self.buried + other.buried,
             deepest: [0, 1].map(|i| self.deepest[i].max(other.deepest[i])),
@@ -127,6 +134,7 @@ pub fn depenetrate(
     assert!(step > 0.0 && clearance > 0.0 && held > 0.0, "step, clearance and held length are positive");
     assert_eq!(offsets.total(), position.len(), "positions of all hairs");
     let space = Space { motion: world_from_skin, origin: Vec3::from(origin) };
+    let folded = bvh.is_folded();
     let mut rest = position;
     let mut hairs = Vec::with_capacity(offsets.len());
     for n in offsets.counts() {
@@ -138,7 +146,7 @@ pub fn depenetrate(
     let one = |(line, open): &mut (Vec<Vec3>, Vec<bool>), (h, stored): (usize, &mut [[f32; 3]])| {
         line.clear();
         line.extend(stored.iter().map(|p| space.read(p)));
-        let probe = Probe { bvh, settings };
+        let probe = Probe { bvh, settings, folded };
         // A sum that is not finite: a hair with a number that is not.
         if !line.iter().map(Vec3::sum).sum::<f64>().is_finite() {
             return DepenetrateCounts::default();
@@ -170,127 +178,6 @@ impl Space<'_> {
     }
 }
 
-/// The deepest point of a segment inside the skin.
-#[derive(Clone, Copy)]
-struct Dip {
-    /// Parameter on the segment.
-    t: f64,
-    depth: f64,
-    /// Unit vector to the nearest point of the skin.
-    out: Vec3,
-}
-
-/// What is known about a hair ahead of the point reached.
-#[derive(Clone, Copy)]
-struct Ahead {
-    /// Length that is outside.
-    sure: f64,
-    /// About the distance at the last sample, negative inside.
-    last: f64,
-}
-
-impl Ahead {
-    const UNKNOWN: Ahead = Ahead { sure: 0.0, last: -1.0 };
-}
-
-/// The skin as hair asks for it.
-#[derive(Clone, Copy)]
-struct Probe<'a> {
-    bvh: &'a Bvh,
-    settings: &'a Depenetrate,
-}
-
-impl Probe<'_> {
-    /// Greatest depth beyond the arc length `held`, 0 if nothing is inside; and which segments are, into `open`.
-    fn depth(&self, line: &[Vec3], held: f64, open: &mut Vec<bool>) -> f64 {
-        open.clear();
-        let mut left: f64 = line.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
-        let (mut before, mut ahead, mut deepest) = (0.0, Ahead::UNKNOWN, 0.0f64);
-        for w in line.windows(2) {
-            let length = (w[1] - w[0]).norm();
-            let from = (held - before).max(0.0);
-            let dip = if from < length { self.dip(w[0], w[1], from, left, &mut ahead) } else { None };
-            open.push(dip.is_some());
-            deepest = deepest.max(dip.map_or(0.0, |d| d.depth));
-            before += length;
-            left -= length;
-        }
-        deepest
-    }
-
-    /// Deepest point of a segment beyond `from`. `left`: length from its beginning to where nothing matters any more.
-    fn dip(&self, a: Vec3, b: Vec3, from: f64, left: f64, ahead: &mut Ahead) -> Option<Dip> {
-        let length = (b - a).norm();
-        let mut s = from.max(ahead.sure);
-        if s >= length {
-            ahead.sure -= length;
-            return None;
-        }
-        let direction = (b - a) / length;
-        let step = self.settings.step;
-        // Distance or a lower bound of it, and the dip where it is negative.
-        let sample = |s: f64, last: f64| {
-            let at = a + direction * s;
-            // From an outside point on, only the skin within reach matters, and far out not on which side it is.
-            let limit = if last >= 0.0 { (left - s).max(0.0) + step } else { f64::INFINITY };
-            if last >= FAR * step {
-                let bound = self.bvh.distance_bound(at, limit);
-                if bound >= 0.5 * FAR * step {
-                    return (bound, None);
-                }
-            }
-            let Some(c) = self.bvh.closest(at, limit) else { return (f64::INFINITY, None) };
-            let depth = -c.signed_distance;
-            let out = (c.position - at).try_normalize(1e-6 * step).unwrap_or(c.normal);
-            (c.signed_distance, (depth > 0.0).then_some(Dip { t: s / length, depth, out }))
-        };
-        let (mut deepest, mut untested) = (None, true);
-        let (mut now, dip) = sample(s, ahead.last);
-        deeper(&mut deepest, dip);
-        loop {
-            if now >= 0.0 && s + now >= length {
-                *ahead = Ahead { sure: s + now - length, last: now };
-                return deepest;
-            }
-            if now >= 0.0 && untested {
-                untested = false;
-                // Sure up to s + now; a ray tells about the rest.
-                if self.bvh.ray(a + direction * (s + now), direction, length - s - now).is_none() {
-                    *ahead = Ahead { sure: 0.0, last: now };
-                    return deepest;
-                }
-            }
-            let end = (s + step.max(now)).min(length);
-            let (next, dip) = sample(end, now);
-            deeper(&mut deepest, dip);
-            if now >= 0.0 && next >= 0.0 && now + next < end - s {
-                // Both are outside, and what is between may not be.
-                let between = self.crossing(a + direction * s, direction, end - s).map(|t| sample(s + t, -1.0));
-                deeper(&mut deepest, between.and_then(|b| b.1));
-            }
-            if end >= length {
-                *ahead = Ahead { sure: next.max(0.0), last: next };
-                return deepest;
-            }
-            (s, now) = (end, next);
-        }
-    }
-
-    /// Middle between the first two places where a line meets the skin within `length`.
-    fn crossing(&self, from: Vec3, direction: Vec3, length: f64) -> Option<f64> {
-        let (enter, _) = self.bvh.ray(from, direction, length)?;
-        let beyond = enter + 1e-6 * length;
-        let (leave, _) = self.bvh.ray(from + direction * beyond, direction, length - beyond)?;
-        Some(0.5 * (enter + beyond + leave))
-    }
-}
-
-fn deeper(deepest: &mut Option<Dip>, dip: Option<Dip>) {
-    if dip.is_some_and(|d| deepest.is_none_or(|e| d.depth > e.depth)) {
-        *deepest = dip;
-    }
-}
-
 /// A hair that is inside.
 struct Job<'a> {
     probe: Probe<'a>,
@@ -310,6 +197,8 @@ struct Job<'a> {
     open: &'a mut Vec<bool>,
     /// Length at the root that is left alone: more than asked for where that cannot suffice.
     held: f64,
+    /// It has no way out from its root.
+    grows_inside: bool,
     /// What a coordinate may be off by as stored, in all.
     grain: f64,
 }
@@ -323,7 +212,7 @@ impl<'a> Job<'a> {
         open: &'a mut Vec<bool>,
     ) -> Self {
         let held = probe.settings.held;
-        let root = probe.bvh.closest(line[0], f64::INFINITY).map_or(0.0, |c| -c.signed_distance);
+        let (root, grows_inside) = probe.root(line[0]);
         let largest = stored.iter().flatten().fold(0.0f32, |m, x| m.max(x.abs()));
         Job {
             probe,
@@ -334,6 +223,7 @@ impl<'a> Job<'a> {
             pushed: vec![false; line.len()],
             open,
             held: if root > SHALLOW * held { held.max(2.0 * root) } else { held },
+            grows_inside,
             grain: f64::from(4.0 * f32::EPSILON * largest),
             line,
             stored,
@@ -342,24 +232,53 @@ impl<'a> Job<'a> {
 
     /// Moves the hair out, which is `before` deep inside, to the side where it came `from` if that is known.
     fn run(mut self, before: f64, from: Option<&[[f32; 3]]>) -> DepenetrateCounts {
+        if self.grows_inside {
+            return self.run_inside();
+        }
         let held = self.probe.settings.held;
         let mut other = Vec::new();
         let clear =
             from.is_some_and(|f| before > DEEP * self.probe.settings.step && self.stride(f)) || self.push_out(before);
         let mut after = if clear && self.held == held { 0.0 } else { self.probe.depth(self.line, held, &mut other) };
-        if after > 0.0 && self.held == held && self.drape() {
-            after = self.probe.depth(self.line, held, &mut other);
+        let mut shortened = false;
+        if after > 0.0 && self.held == held {
+            if self.drape() {
+                after = self.probe.depth(self.line, held, &mut other);
+            }
+            if after > 0.0 {
+                shortened = true;
+                after = self.shorten();
+            }
         }
+        let counts = self.counts([before, after], after > 0.0, self.held > held);
+        if shortened { DepenetrateCounts { shortened: 1, stretched: 0.0, ..counts } } else { counts }
+    }
+
+    /// Moves out what enters again of a hair that grows inside and comes out.
+    fn run_inside(mut self) -> DepenetrateCounts {
+        let mut deepest = [0.0; 2];
+        if let Some(s) = self.probe.comes_out(self.line) {
+            self.held = s;
+            deepest[0] = self.probe.depth(self.line, s, self.open);
+            if deepest[0] > 0.0 && !self.push_out(deepest[0]) {
+                deepest[1] = self.probe.depth(self.line, s, &mut Vec::new());
+            }
+        }
+        self.counts(deepest, true, true)
+    }
+
+    fn counts(&self, deepest: [f64; 2], uncleared: bool, buried: bool) -> DepenetrateCounts {
         let far = self.line.iter().zip(&self.drawn.0).map(|(p, q)| (p - q).norm()).fold(0.0, f64::max);
         let longer = |(w, l): (&[Vec3], &f64)| if *l > 0.0 { ((w[1] - w[0]).norm() / l - 1.0).abs() } else { 0.0 };
         let stretched = self.line.windows(2).zip(&self.length).map(longer).fold(0.0, f64::max);
         DepenetrateCounts {
             pushed: usize::from(*self.stored != *self.drawn.1),
-            uncleared: usize::from(after > 0.0),
-            buried: usize::from(after > 0.0 && self.held > held),
-            deepest: [before, after],
+            shortened: 0,
+            uncleared: usize::from(uncleared),
+            buried: usize::from(uncleared && buried),
+            deepest,
             moved: far,
-            stretched: if after > 0.0 { 0.0 } else { stretched },
+            stretched: if uncleared { 0.0 } else { stretched },
         }
     }
 
@@ -456,7 +375,8 @@ impl<'a> Job<'a> {
     fn drape(&mut self) -> bool {
         let Depenetrate { step, clearance, .. } = *self.probe.settings;
         let Some(root) = self.probe.bvh.closest(self.line[0], f64::INFINITY) else { return false };
-        let Some(line) = drape(self.probe.bvh, &PushUp { step, clearance }, root.normal, &self.drawn.0) else {
+        let closest = |at: Vec3, limit: f64| self.probe.closest(at, limit);
+        let Some(line) = drape(&closest, &PushUp { step, clearance }, root.normal, &self.drawn.0) else {
             return false;
         };
         for (k, p) in line.into_iter().enumerate().skip(1) {
@@ -465,12 +385,50 @@ impl<'a> Job<'a> {
         true
     }
 
+    /// For a hair that nothing else got out: it becomes straight, in the direction with the most room, and no longer than
+    /// that; at worst as long as may be inside. Returns how deep it then is.
+    fn shorten(&mut self) -> f64 {
+        let Depenetrate { step, held, .. } = *self.probe.settings;
+        let Some(nearest) = self.probe.closest(self.line[0], f64::INFINITY) else { return 0.0 };
+        let total: f64 = self.length.iter().sum();
+        let (root, chord) = (self.line[0], self.drawn.0[self.length.len()] - self.line[0]);
+        let toward = chord.try_normalize(0.0).unwrap_or(nearest.normal);
+        let room = |d: Vec3| {
+            let mut s = held;
+            while s < total && self.probe.closest(root + d * s, step).is_none_or(|c| c.signed_distance > 0.0) {
+                s += step;
+            }
+            s.min(total)
+        };
+        let mut best = (0.0, nearest.normal);
+        for d in around(nearest.normal, toward) {
+            let r = room(d);
+            if r > best.0 {
+                best = (r, d);
+            }
+        }
+        let (mut long, direction) = best;
+        loop {
+            let mut before = 0.0;
+            for k in 0..self.length.len() {
+                before += self.length[k];
+                self.place(k + 1, root + direction * (long * before / total));
+            }
+            let depth = self.probe.depth(self.line, held, &mut Vec::new());
+            if depth == 0.0 || long < 0.9 * held {
+                return depth;
+            }
+            long *= SHORTER;
+        }
+    }
+
     /// Once along the hair: whether anything moved, and whether something inside could not be.
     fn sweep(&mut self, stretch: f64) -> (bool, bool) {
-        let (mut moved, mut stuck, mut before) = (false, false, 0.0);
+        let (mut moved, mut stuck, mut before, mut gone) = (false, false, 0.0, 0.0);
         for i in 0..self.length.len() {
             moved |= self.follow(i, stretch);
-            let from = (self.held - before).max(0.0);
+            // As the hair lies now, not as it came: pushed segments are longer or shorter.
+            let from = (self.held - gone).max(0.0);
             for _ in 0..TRIES {
                 if !self.open[i] {
                     break;
@@ -481,12 +439,17 @@ impl<'a> Job<'a> {
                     break;
                 }
                 let Some(dip) = self.probe.dip(a, b, from, (b - a).norm(), &mut Ahead::UNKNOWN.clone()) else { break };
-                let way = dip.depth + self.clearance(before + dip.t * self.length[i]);
-                let pushed = self.push(i, &dip, way, stretch);
+                let way = dip.way(self.clearance(before + dip.t * self.length[i]));
+                let pushed = self.push(i, dip.t, way, stretch);
                 moved |= pushed;
-                stuck |= !pushed;
+                if !pushed {
+                    // Still to be looked at, should anything else have moved.
+                    (stuck, self.open[i]) = (true, true);
+                    break;
+                }
             }
             before += self.length[i];
+            gone += (self.line[i + 1] - self.line[i]).norm();
         }
         (moved, stuck)
     }
@@ -513,15 +476,15 @@ impl<'a> Job<'a> {
         direction.is_some_and(|d| self.place(k, self.line[i] + d * to))
     }
 
-    /// Moves a segment so that its deepest point goes `way` out: both ends by their weights of that point, which is the
+    /// Moves a segment so that its point at `t` goes a `way`: both ends by their weights of that point, which is the
     /// least motion in the sum of squares; the end alone where the segment begins at the root.
-    fn push(&mut self, i: usize, dip: &Dip, way: f64, stretch: f64) -> bool {
-        let (a, b) = if i == 0 { (0.0, dip.t) } else { (1.0 - dip.t, dip.t) };
+    fn push(&mut self, i: usize, t: f64, (out, way): (Vec3, f64), stretch: f64) -> bool {
+        let (a, b) = if i == 0 { (0.0, t) } else { (1.0 - t, t) };
         let whole = way / (a * a + b * b);
         let mut moved = false;
         for (k, weight) in [(i, a), (i + 1, b)] {
             if weight > 1e-9 {
-                moved |= self.place(k, self.line[k] + dip.out * (whole * weight));
+                moved |= self.place(k, self.line[k] + out * (whole * weight));
                 self.pushed[k] = true;
             }
         }

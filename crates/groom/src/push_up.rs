@@ -60,7 +60,7 @@ pub fn push_up(skin: &Skin, bvh: &Bvh, settings: &PushUp, hairs: &mut ControlHai
     let lift = |(h, local): (usize, &mut [[f32; 3]])| {
         let frame = skin.frame(&root[h]);
         let line = world_points(&frame, local);
-        let job = Job { skin: Some(skin), bvh, settings, normal: frame.n };
+        let job = Job { skin: Some(skin), closest: &|at, limit| bvh.closest(at, limit), settings, normal: frame.n };
         let (line, counts) = job.clear(line);
         if counts.pushed > 0 {
             for (out, p) in local.iter_mut().zip(&line) {
@@ -78,17 +78,20 @@ pub fn push_up(skin: &Skin, bvh: &Bvh, settings: &PushUp, hairs: &mut ControlHai
 }
 
 /// A line from the skin turned out of it segment by segment, its lengths kept; `None` if there is no way out. `normal` is
-/// that of the skin at its root.
-pub(crate) fn drape(bvh: &Bvh, settings: &PushUp, normal: Vec3, line: &[Vec3]) -> Option<Vec<Vec3>> {
-    let (line, counts) = Job { skin: None, bvh, settings, normal }.clear(line.to_vec());
+/// that of the skin at its root, `closest` finds the skin nearest to a point within a limit.
+pub(crate) fn drape(closest: Find<'_>, settings: &PushUp, normal: Vec3, line: &[Vec3]) -> Option<Vec<Vec3>> {
+    let (line, counts) = Job { skin: None, closest, settings, normal }.clear(line.to_vec());
     (counts.uncleared == 0).then_some(line)
 }
+
+/// Nearest skin of a point within a limit.
+pub(crate) type Find<'a> = &'a dyn Fn(Vec3, f64) -> Option<Closest>;
 
 /// One hair.
 struct Job<'a> {
     /// For smooth normals; without, those of triangles do.
     skin: Option<&'a Skin<'a>>,
-    bvh: &'a Bvh,
+    closest: Find<'a>,
     settings: &'a PushUp,
     /// Normal at the root.
     normal: Vec3,
@@ -180,7 +183,7 @@ impl Job<'_> {
     /// Smooth normal of the skin nearest to a point.
     fn normal_near(&self, at: Vec3) -> Vec3 {
         let smooth = |c: Closest| self.skin.map_or(c.normal, |s| s.frame(&c.point).n);
-        self.bvh.closest(at, f64::INFINITY).map_or(self.normal, smooth)
+        (self.closest)(at, f64::INFINITY).map_or(self.normal, smooth)
     }
 
     /// Walks along a segment that begins at arc length `before` of its hair (its first point was checked as the end of
@@ -194,7 +197,7 @@ impl Job<'_> {
             // Nothing nearer than `sure` can be too near; on the ramp samples stay close.
             let fine = if before + s < ramp { (0.25 * step).min(0.05 * ramp) } else { step.min(2.0 * clearance) };
             s = (s + fine.max(sure)).min(length);
-            let Some(hit) = self.bvh.closest(from + d * s, f64::INFINITY) else { return Fit::Clear };
+            let Some(hit) = (self.closest)(from + d * s, f64::INFINITY) else { return Fit::Clear };
             let need = clearance * ((before + s) / ramp).min(1.0) * share;
             if hit.signed_distance < need {
                 return Fit::Misses(need - hit.signed_distance);
@@ -207,7 +210,7 @@ impl Job<'_> {
 
 /// Directions spread evenly over the half-sphere around `n` (a spherical Fibonacci lattice) and `n` itself, those nearest
 /// to `d` first.
-fn around(n: Vec3, d: Vec3) -> Vec<Vec3> {
+pub(crate) fn around(n: Vec3, d: Vec3) -> Vec<Vec3> {
     let golden = std::f64::consts::PI * (3.0 - 5.0f64.sqrt());
     let side = slerp(n, if n.x.abs() < 0.9 { Vec3::x() } else { Vec3::y() }, 1.0).cross(&n).normalize();
     let mut out = vec![n];

@@ -314,3 +314,44 @@ fn hair_stays_on_the_side_that_it_came_from() {
     assert!(jumps(None) > 3.0, "by the nearest way out it changes sides: {}", jumps(None));
     assert!(jumps(Some(&came)) < 1.0, "{}", jumps(Some(&came)));
 }
+
+/// Two balls, one in the other, as a limb in a body: hair with its root in the other is left, all other ends outside both.
+#[test]
+fn hair_ends_outside_a_skin_that_runs_through_itself() {
+    let centre = [Vec3::zeros(), Vec3::new(6.0, 0.5, 0.3)];
+    let mut mesh = Mesh::default();
+    for c in centre {
+        let ball = shapes::cube_sphere(16, 4.0);
+        let first = mesh.position.len() as u32;
+        mesh.position.extend(ball.position.iter().map(|p| <[f64; 3]>::from(Vec3::from(*p) + c)));
+        mesh.triangle.extend(ball.triangle.iter().map(|t| t.map(|v| first + v)));
+    }
+    let skin = Skin::new(mesh);
+    let points = 16;
+    let before = skin.hairs(600, points, 6.0);
+    let mut after = before.clone();
+    let counts = skin.run(points, &mut after);
+    let (mut grown, mut left, mut nearest_is_not_out) = (0, 0, 0);
+    for (h, (old, new)) in before.chunks(points).zip(after.chunks(points)).enumerate() {
+        let depth = centre.map(|c| 4.0 - (at(&old[0]) - c).norm());
+        // Its own ball's surface, and that of the other above it.
+        let covered = depth[0].max(depth[1]);
+        let still = any_sample(new, 0.1, |p| skin.inside_by_angle(p));
+        if covered > 0.5 {
+            grown += 1;
+            let never_out = !any_sample(old, 0.1, |p| !skin.inside_by_angle(p));
+            left += usize::from(never_out && old == new);
+            assert!(!never_out || old == new, "hair {h} grows inside and was moved");
+        } else if covered < 0.01 {
+            assert!(!still, "hair {h} is inside");
+            let was = any_sample(old, 0.1, |p| skin.inside_by_angle(p));
+            assert!(was || old == new || any_sample(old, 0.002, |p| skin.inside_by_angle(p)), "hair {h} was pushed");
+            // What the nearest skin alone would have let pass.
+            let behind = |p: Vec3| skin.bvh.closest(p, f64::INFINITY).unwrap().signed_distance < 0.0;
+            nearest_is_not_out += usize::from(any_sample(old, 0.1, |p| skin.inside_by_angle(p) && !behind(p)));
+        }
+    }
+    println!("{grown} grow inside, {left} never come out; {nearest_is_not_out}; {counts:?}");
+    assert!(grown > 20 && left > 5 && nearest_is_not_out > 5);
+    assert!(counts.buried >= grown && counts.uncleared == counts.buried, "{counts:?}");
+}

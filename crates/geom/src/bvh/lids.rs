@@ -2,6 +2,7 @@
 
 use super::{Bvh, Feature};
 use crate::{NONE, Topology, Vec3};
+use std::sync::OnceLock;
 
 impl Bvh {
     /// Says that triangles from `first` on close holes. In another pose than the one it was made for a lid may cut
@@ -20,6 +21,7 @@ impl Bvh {
             (0..3).for_each(|i| self.rim[self.triangle[k][i] as usize] = on_lid[welded(k, i) as usize]);
         }
         self.lids = first as u32;
+        self.folds = OnceLock::new();
         self
     }
 

@@ -39,14 +39,14 @@ impl Bvh {
 }
 
 /// Ray in a space where it runs along one axis.
-struct Shear {
+pub(super) struct Shear {
     origin: Vec3,
     axis: [usize; 3],
     shear: Vec3,
 }
 
 impl Shear {
-    fn new(origin: Vec3, direction: Vec3) -> Option<Self> {
+    pub(super) fn new(origin: Vec3, direction: Vec3) -> Option<Self> {
         let z = direction.iamax();
         if direction[z] == 0.0 {
             return None;
@@ -57,7 +57,7 @@ impl Shear {
     }
 
     /// Parameter of the hit and weights of corners 1 and 2.
-    fn hit(&self, corner: [Vec3; 3]) -> Option<(f64, [f64; 2])> {
+    pub(super) fn hit(&self, corner: [Vec3; 3]) -> Option<(f64, [f64; 2])> {
         let [kx, ky, kz] = self.axis;
         let p = corner.map(|c| {
             let d = c - self.origin;
