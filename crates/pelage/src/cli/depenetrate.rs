@@ -398,6 +398,7 @@ fn report(a: &DepenetrateArguments, source: &Source, counts: &DepenetrateCounts,
             "pushed": counts.pushed,
             "still_inside": counts.uncleared,
             "buried_roots": counts.buried,
+            "shortened": counts.shortened,
             "deepest_before_mm": before,
             "deepest_after_mm": after,
             "farthest_moved_mm": counts.moved / mm,
@@ -412,7 +413,10 @@ fn report(a: &DepenetrateArguments, source: &Source, counts: &DepenetrateCounts,
     }
     let mut out = format!("{hairs} hairs, {} pushed, {} still inside", counts.pushed, counts.uncleared);
     if counts.buried > 0 {
-        out.push_str(&format!(" ({} with a root too deep to get out within --held {} mm)", counts.buried, a.held));
+        out.push_str(&format!(" ({} that grow within the skin, deeper than --held {} mm)", counts.buried, a.held));
+    }
+    if counts.shortened > 0 {
+        out.push_str(&format!(", {} shortened for want of room", counts.shortened));
     }
     out.push_str(&format!("\ndeepest: {before:.3} mm before, {after:.3} mm after\n"));
     let (moved, stretch) = (counts.moved / mm, 100.0 * counts.stretched);

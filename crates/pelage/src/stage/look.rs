@@ -157,7 +157,9 @@ fn collide(
     let offsets = Offsets::uniform(position.len() / points, points);
     let found = depenetrate(bvh, &settings, motion, &offsets, skin.origin(), from, position);
     counts.insert("hairs pushed out of the skin".to_owned(), found.pushed as u64);
-    counts.insert("hairs still in the skin".to_owned(), found.uncleared as u64);
+    counts.insert("hairs shortened for want of room".to_owned(), found.shortened as u64);
+    counts.insert("hairs that grow within the skin".to_owned(), found.buried as u64);
+    counts.insert("hairs still in the skin".to_owned(), (found.uncleared - found.buried) as u64);
     Ok(())
 }
 

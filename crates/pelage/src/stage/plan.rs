@@ -94,7 +94,7 @@ pub(super) mod version {
     pub const INTERPOLATE: u32 = 1;
     pub const CLUMP: u32 = 1;
     pub const LOOK: u32 = 2;
-    pub const COLLISION: u32 = 2;
+    pub const COLLISION: u32 = 3;
     pub const AREAS: u32 = 1;
     pub const SHADOW: u32 = 2;
     pub const EXPORT: u32 = 1;
