@@ -7,6 +7,7 @@ mod init;
 mod inspect;
 mod preview;
 mod run;
+mod stress;
 mod watch;
 
 use crate::Error;
@@ -70,6 +71,8 @@ pub enum Command {
     },
     /// Push curves out of a skin
     Depenetrate(depenetrate::DepenetrateArguments),
+    /// Do to hair what no shot should, and say what it bore
+    Stress(stress::StressArguments),
     /// Look after the cache
     Cache {
         /// What to do with it
@@ -259,6 +262,7 @@ pub fn execute(arguments: Arguments) -> Result<bool, Error> {
         Command::Inspect { file, json } => inspect::inspect(&file, json),
         Command::Compare { a, b, tolerance, json } => compare::compare(&a, &b, tolerance, json),
         Command::Depenetrate(a) => depenetrate::run(&a),
+        Command::Stress(a) => stress::run(&a),
         Command::Cache { action } => cache::cache(action),
         Command::Schema { file } => {
             let text = match file {
