@@ -191,7 +191,7 @@ fn middle(scene: &Scene) -> Vec3 {
 /// Width of hair by its depth: factor at depth 0, and its change by depth. It is 1 at the nearest hair before the camera
 /// and `1 - strength` at the farthest.
 fn cue(scene: &Scene, view: &View, strength: f32) -> [f32; 2] {
-    if !(strength > 0.0) {
+    if strength <= 0.0 || strength.is_nan() {
         return [1.0, 0.0];
     }
     let none = [f32::INFINITY, f32::NEG_INFINITY];

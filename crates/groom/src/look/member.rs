@@ -265,7 +265,7 @@ pub fn rest_sites(skin: &Skin, root: &[SurfacePoint], origin: [f64; 3]) -> (Vec<
 /// as many blur partings.
 const AROUND: usize = 16;
 
-/// Hairs per square scene unit around each root: so many lie within the distance of the [`AROUND`]-th nearest one, on skin
+/// Hairs per square scene unit around each root: so many lie within the distance of the 16th nearest one, on skin
 /// that is taken as flat. Changes gradually where roots move.
 pub fn densities(position: &[[f32; 3]]) -> Vec<f32> {
     let n = position.len();

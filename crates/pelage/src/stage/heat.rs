@@ -86,74 +86,52 @@ pub struct Heat {
 
 /// Values of a column at a frame.
 pub fn column(run: &mut Runner<'_>, column: &Column, frame: i32) -> Result<Heat, Error> {
-    let count = run.project.groom.value.layer.len();
-    let unit = run.project.shot.value.shot.meters_per_unit;
-    let at = |i: usize| What::Frame(i, frame);
-    let mut each = |of: &mut dyn FnMut(&mut Runner<'_>, usize) -> Result<Vec<f32>, Error>| {
-        (0..count).map(|i| of(run, i)).collect::<Result<Vec<_>, Error>>()
+    let title = match column {
+        Column::Length => "length, cm",
+        Column::Strain => "length over that at rest, %",
+        Column::Density => "density, hairs per cm2",
+        Column::Width => "width, micrometres",
+        Column::Opacity => "opacity",
+        Column::Wetness => "wetness",
+        Column::Penetration => "depth in the skin, mm",
+        Column::Transmittance(None) => "light that arrives",
+        Column::Transmittance(Some(light)) => &format!("light of {light} that arrives"),
+        Column::Clump(level) => &format!("clumps of level {level}"),
     };
-    let (values, title) = match column {
-        Column::Length => {
-            let length = |o: &Offsets, p: &[[f32; 3]]| per_hair(o, |r| 100.0 * unit * curve::length(&p[r]));
-            let of = &mut |run: &mut Runner<'_>, i| {
-                let offsets = export::thickness(run, i)?.offsets;
-                Ok(length(&offsets, &interpolate::hairs(run, at(i))?.position))
-            };
-            (each(of)?, "length, cm".to_owned())
-        }
-        Column::Strain => {
-            let of = &mut |run: &mut Runner<'_>, i| {
-                let offsets = export::thickness(run, i)?.offsets;
-                let (now, rest) = (
-                    interpolate::hairs(run, at(i))?.position,
-                    interpolate::positions(run, finished_rest(run.project, i))?,
-                );
-                Ok(per_hair(&offsets, |r| 100.0 * (curve::length(&now[r.clone()]) / curve::length(&rest[r]) - 1.0)))
-            };
-            (each(of)?, "length over that at rest, %".to_owned())
-        }
-        Column::Density => {
-            let cm2 = run_cm2(unit);
-            let of = &mut |run: &mut Runner<'_>, i| {
-                let share = run.project.share[i] as f32;
-                Ok(shadow::density(run, i)?.into_iter().map(|d| d * cm2 / share).collect())
-            };
-            (each(of)?, "density, hairs per cm2".to_owned())
-        }
-        Column::Width => {
-            let of = &mut |run: &mut Runner<'_>, i| {
-                let layer = export::thickness(run, i)?;
-                let wet = interpolate::hairs(run, at(i))?.wet_columns(Some(&layer)).0;
-                let width = if wet.is_empty() { layer.width } else { wet };
-                Ok(width.iter().map(|w| (f64::from(*w) * unit * 1e6) as f32).collect())
-            };
-            (each(of)?, "width, micrometres".to_owned())
-        }
-        Column::Opacity => {
-            let of = &mut |run: &mut Runner<'_>, i| {
-                let layer = export::thickness(run, i)?;
-                let wet = interpolate::hairs(run, at(i))?.wet_columns(Some(&layer)).1;
-                Ok(if wet.is_empty() { layer.opacity } else { wet })
-            };
-            (each(of)?, "opacity".to_owned())
-        }
-        Column::Wetness => {
-            let of = &mut |run: &mut Runner<'_>, i| {
-                let hairs = export::thickness(run, i)?.offsets.len();
-                let wet = interpolate::hairs(run, at(i))?.wet;
-                Ok((0..hairs).map(|h| wet.get(h).map_or(0.0, |w| w[2])).collect())
-            };
-            (each(of)?, "wetness".to_owned())
-        }
-        Column::Penetration => (penetration(run, frame)?, "depth in the skin, mm".to_owned()),
-        Column::Transmittance(light) => (transmittance(run, light.as_deref(), frame)?, title_of(light.as_deref())),
-        Column::Clump(level) => return clumps_of(run, *level),
+    let layers = 0..run.project.groom.value.layer.len();
+    let values = match column {
+        Column::Penetration => penetration(run, frame)?,
+        Column::Transmittance(light) => transmittance(run, light.as_deref(), frame)?,
+        Column::Clump(level) => layers.map(|i| clump(run, i, *level)).collect::<Result<_, Error>>()?,
+        _ => layers.map(|i| of_layer(run, column, i, frame)).collect::<Result<_, Error>>()?,
     };
-    Ok(Heat { values, title, scale: true })
+    Ok(Heat { values, title: title.to_owned(), scale: !matches!(column, Column::Clump(_)) })
 }
 
-fn title_of(light: Option<&str>) -> String {
-    light.map_or("light that arrives".to_owned(), |l| format!("light of {l} that arrives"))
+/// Values of a layer that follow from its hairs and columns alone.
+fn of_layer(run: &mut Runner<'_>, column: &Column, i: usize, frame: i32) -> Result<Vec<f32>, Error> {
+    let unit = run.project.shot.value.shot.meters_per_unit;
+    if *column == Column::Density {
+        let per = run_cm2(unit) / run.project.share[i] as f32;
+        return Ok(shadow::density(run, i)?.into_iter().map(|d| d * per).collect());
+    }
+    let (layer, hairs) = (export::thickness(run, i)?, interpolate::hairs(run, What::Frame(i, frame))?);
+    let offsets = layer.offsets.clone();
+    let length = |p: &[[f32; 3]], r| curve::length(&p[r]);
+    let (width, opacity) = match hairs.wet.is_empty() {
+        true => (layer.width, layer.opacity),
+        false => hairs.wet_columns(Some(&layer)),
+    };
+    Ok(match column {
+        Column::Length => per_hair(&offsets, |r| 100.0 * unit * length(&hairs.position, r)),
+        Column::Strain => {
+            let rest = interpolate::positions(run, finished_rest(run.project, i))?;
+            per_hair(&offsets, |r| 100.0 * (length(&hairs.position, r.clone()) / length(&rest, r) - 1.0))
+        }
+        Column::Width => width.iter().map(|w| (f64::from(*w) * unit * 1e6) as f32).collect(),
+        Column::Opacity => opacity,
+        _ => (0..offsets.len()).map(|h| hairs.wet.get(h).map_or(0.0, |w| w[2])).collect(),
+    })
 }
 
 /// Square scene units of a square centimetre, inverted.
@@ -215,19 +193,11 @@ fn transmittance(run: &mut Runner<'_>, light: Option<&str>, frame: i32) -> Resul
     Ok(found.iter_mut().map(|l| l.swap_remove(0)).collect())
 }
 
-fn clumps_of(run: &mut Runner<'_>, level: usize) -> Result<Heat, Error> {
-    let count = run.project.groom.value.layer.len();
-    let mut values = Vec::new();
-    for i in 0..count {
-        let hairs = export::thickness(run, i)?.offsets.len();
-        let none = vec![-1.0; hairs];
-        values.push(match acting_clumps(run.project, i).contains(&level) {
-            true => {
-                let members = clumps::clumps(run, i, level)?;
-                members.clump.iter().map(|c| if *c == NONE { -1.0 } else { *c as f32 }).collect()
-            }
-            false => none,
-        });
+/// Number of each hair's clump; -1 without one.
+fn clump(run: &mut Runner<'_>, i: usize, level: usize) -> Result<Vec<f32>, Error> {
+    if !acting_clumps(run.project, i).contains(&level) {
+        return Ok(vec![-1.0; export::thickness(run, i)?.offsets.len()]);
     }
-    Ok(Heat { values, title: format!("clumps of level {level}"), scale: false })
+    let members = clumps::clumps(run, i, level)?;
+    Ok(members.clump.iter().map(|c| if *c == NONE { -1.0 } else { *c as f32 }).collect())
 }

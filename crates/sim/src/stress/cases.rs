@@ -479,7 +479,8 @@ fn root_no_number(model: Model, m: &mut Measures) -> Done {
         for turned in [false, true] {
             let mut rig = Rig::new(&tuft(), &settings(model))?;
             let mut same = rig.clone();
-            (rig.wait(2)?, same.wait(14)?);
+            rig.wait(2)?;
+            same.wait(14)?;
             let good = rig.roots.clone();
             let mut broken = good.clone();
             if turned {
