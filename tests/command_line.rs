@@ -336,3 +336,19 @@ fn previews_need_no_export() {
     assert_eq!(report["stages"][3]["ran"], 3);
     assert!(shot.succeed(&["preview"]).starts_with("nothing to do"));
 }
+
+#[test]
+fn stress_tells_what_hair_bears() {
+    let shot = ShotFolder::new(COMMAND);
+    let list = shot.succeed(&["stress", "--list"]);
+    assert!(list.lines().count() >= 20 && list.contains("storm"), "{list}");
+    let table = shot.succeed(&["stress", "teleport", "--quiet"]);
+    assert!(table.contains("teleport (springs)") && table.contains("strands not carried along"), "{table}");
+    assert!(table.ends_with("bounds hold\n") && !table.contains("BROKEN"), "{table}");
+    let cases: serde_json::Value =
+        serde_json::from_str(&shot.succeed(&["stress", "input", "--quiet", "--json"])).expect("JSON");
+    assert_eq!(cases.as_array().map(Vec::len), Some(2));
+    let out = shot.pelage(&["stress", "nonsense"]);
+    let err = String::from_utf8_lossy(&out.stderr).into_owned();
+    assert!(out.status.code() == Some(2) && err.contains("no case `nonsense`") && err.contains("teleport"), "{err}");
+}

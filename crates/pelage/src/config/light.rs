@@ -173,7 +173,7 @@ impl Document<ShotFile> {
             let Some(keyed) = keyed else { continue };
             let fine = |v: &Vector| v.0.iter().all(|x| x.abs() <= 1e18) && (key == "position" || v.0 != [0.0; 3]);
             if !keyed.0.iter().all(|k| fine(&k.value)) {
-                let what = if key == "position" { "must be finite numbers" } else { "must be a direction" };
+                let what = if key == "position" { "must be finite numbers, up to 1e18" } else { "must be a direction" };
                 return Err(self.error(&format!("{at}.{key}"), what, "for example [0.0, -1.0, 0.0]"));
             }
             self.check_keys(&format!("{at}.{key}"), keyed)?;

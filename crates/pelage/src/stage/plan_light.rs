@@ -91,7 +91,7 @@ impl Reader<'_> {
             r = r.param("softness", light.fade(), key("softness"));
         }
         let how = match settings(&project.shot.value.shadow) {
-            None => "rays".to_owned(),
+            None => format!("{} rays", super::shadow::RAYS),
             Some(s) => format!(
                 "{} texels, {} slices, {:?}, filter {}, {:?}",
                 s.texels, s.slices, s.placement, s.filter, s.interpolation
