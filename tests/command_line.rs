@@ -345,8 +345,7 @@ fn stress_tells_what_hair_bears() {
     let table = shot.succeed(&["stress", "teleport", "--quiet"]);
     assert!(table.contains("teleport (springs)") && table.contains("strands not carried along"), "{table}");
     assert!(table.ends_with("bounds hold\n") && !table.contains("BROKEN"), "{table}");
-    let cases: serde_json::Value =
-        serde_json::from_str(&shot.succeed(&["stress", "input", "--quiet", "--json"])).expect("JSON");
+    let cases: Value = serde_json::from_str(&shot.succeed(&["stress", "input", "--quiet", "--json"])).expect("JSON");
     assert_eq!(cases.as_array().map(Vec::len), Some(2));
     let out = shot.pelage(&["stress", "nonsense"]);
     let err = String::from_utf8_lossy(&out.stderr).into_owned();
