@@ -40,7 +40,7 @@ const ELSEWHERE: [&str; 6] = ["Control", "Placement", "Parting", "Material", "Ma
 /// Where the part of the page begins that is made here.
 const BEGINS: &str = "## Every parameter\n";
 
-fn docs() -> PathBuf {
+pub(super) fn docs() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs")
 }
 
@@ -54,7 +54,7 @@ fn keys<'a>(root: &'a Value, table: &str) -> impl Iterator<Item = (&'a String, &
 }
 
 /// Settings as they stand in a file, on one line.
-fn code(text: &str) -> String {
+pub(super) fn code(text: &str) -> String {
     let lines = text.lines().filter(|l| !l.is_empty()).map(|l| format!("`{l}`"));
     let all = lines.collect::<Vec<_>>().join(" ");
     if all.is_empty() { "not given".to_owned() } else { all }

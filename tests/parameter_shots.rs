@@ -1,7 +1,7 @@
 //! Tiny shots that show one parameter each: a patch of skin or a ball with hair, always seen by the same camera.
 
 use crate::ascii_ply;
-use crate::parameters::{Hair, Shown};
+use crate::parameters::{Hair, Shown, picture_file};
 use pelage::format::image::png_bytes;
 use pelage_geom::{Mesh, Vec3, shapes};
 
@@ -32,7 +32,7 @@ impl Shown {
 
     /// Its name in the folder of pictures.
     pub fn file(&self) -> String {
-        format!("{}.png", self.key.replace('.', "-"))
+        picture_file(self.key)
     }
 
     /// Files of the shot that shows one of its settings, by path.

@@ -3,6 +3,11 @@
 mod features;
 pub mod light;
 
+/// Name of the picture of a key.
+pub fn picture_file(key: &str) -> String {
+    format!("{}.png", key.replace('.', "-"))
+}
+
 /// One parameter in three pictures.
 pub struct Shown {
     /// Table and key: `clump.percent`.

@@ -1,12 +1,13 @@
 //! `docs/pictures.md` shows the settings of lights and pictures: the text of its second half is made from the configuration
 //! structs and the list of pictures. `PELAGE_UPDATE_GOLDEN=1 cargo test -p pelage-tests pictures_page` rewrites it.
 
+use super::look_page::{code, docs};
 use pelage::config::{Document, GroomFile, ShotFile, schema};
 use pelage_tests::parameters::light::{LIT, Lit};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Tables of the page: title, name in the list of pictures, name in the schema.
 const SECTIONS: [(&str, &str, &str); 5] = [
@@ -19,17 +20,6 @@ const SECTIONS: [(&str, &str, &str); 5] = [
 
 /// Where the part of the page begins that is made here.
 const BEGINS: &str = "## Every setting\n";
-
-fn docs() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs")
-}
-
-/// Settings as they stand in a file, on one line.
-fn code(text: &str) -> String {
-    let lines = text.lines().filter(|l| !l.is_empty()).map(|l| format!("`{l}`"));
-    let all = lines.collect::<Vec<_>>().join(" ");
-    if all.is_empty() { "not given".to_owned() } else { all }
-}
 
 fn settings() -> String {
     let root: Value = serde_json::from_str(&schema::<ShotFile>()).expect("a schema is JSON");

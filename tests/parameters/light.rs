@@ -1,7 +1,7 @@
 //! Settings of lights, shadows and pictures, three of each, over hair that shows them.
 
 use super::Hair::{Ball, Curtain, Field, Fur};
-use super::{Hair, Shown};
+use super::{Hair, Shown, picture_file};
 
 /// A setting of the shot file in three pictures.
 pub struct Lit {
@@ -140,7 +140,7 @@ pub const LIT: &[Lit] = &[
 impl Lit {
     /// Its name in the folder of pictures.
     pub fn file(&self) -> String {
-        format!("{}.png", self.key.replace('.', "-"))
+        picture_file(self.key)
     }
 
     /// Files of the shot that shows one of its settings, by path.

@@ -109,11 +109,7 @@ impl Camera {
         turns: u32,
     ) -> (Camera, [f64; 3]) {
         let finite = || points.iter().filter(|p| p.iter().all(|v| v.is_finite()));
-        let (low, high) = finite().fold((Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY)), |(l, h), p| {
-            let p = Vec3::from(*p);
-            (l.inf(&p), h.sup(&p))
-        });
-        let axis = if low.x <= high.x { (low + high) * 0.5 } else { Vec3::zeros() };
+        let axis = middle(finite().map(|p| Vec3::from(*p)));
         let turn = |k: u32| turn(Vec3::from(up), std::f64::consts::TAU * f64::from(k) / f64::from(turns.max(1)));
         let turned = (0..turns.max(1)).flat_map(|k| {
             let turn = turn(k);
@@ -185,6 +181,13 @@ impl View {
         let s = self.scale(c.z);
         (c.z >= self.near).then(|| [self.centre[0] + c.x * s, self.centre[1] + c.y * s, c.z])
     }
+}
+
+/// Middle of the bounds of finite points; the origin without any.
+pub(crate) fn middle(points: impl Iterator<Item = Vec3>) -> Vec3 {
+    let none = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
+    let (low, high) = points.fold(none, |(low, high), p| (low.inf(&p), high.sup(&p)));
+    if low.x <= high.x { (low + high) * 0.5 } else { Vec3::zeros() }
 }
 
 /// Rotation by an angle about a direction, which need not be unit (Rodrigues' formula); none about no direction.

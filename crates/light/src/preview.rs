@@ -8,7 +8,7 @@ use crate::hair::{Chunk, Draw, Scratch, Tiling};
 use crate::raster::{Facet, Filter, Point, TILE, Tile};
 use crate::shade::{HairModel, HairPoint, LightDir, fade, to_light};
 use crate::slab::{HUGE, Slabs};
-use crate::{Camera, HairShade, Image, Light, V3, View};
+use crate::{Camera, HairShade, Image, Light, V3, View, camera};
 use pelage_geom::{Offsets, Vec3};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -182,10 +182,7 @@ fn not_nan(x: f32) -> f32 {
 fn middle(scene: &Scene) -> Vec3 {
     let hair = scene.layers.iter().flat_map(|l| l.position.iter().map(|p| in_layer(l, p)));
     let skin = scene.skin.iter().flat_map(|s| s.position.iter().map(|p| Vec3::from(*p)));
-    let none = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
-    let finite = hair.chain(skin).filter(|p| p.iter().all(|v| v.abs() < HUGE));
-    let (low, high) = finite.fold(none, |(low, high), p| (low.inf(&p), high.sup(&p)));
-    if low.x <= high.x { (low + high) * 0.5 } else { Vec3::zeros() }
+    camera::middle(hair.chain(skin).filter(|p| p.iter().all(|v| v.abs() < HUGE)))
 }
 
 /// Width of hair by its depth: factor at depth 0, and its change by depth. It is 1 at the nearest hair before the camera

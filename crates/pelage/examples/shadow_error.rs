@@ -7,7 +7,6 @@
 #![allow(missing_docs, clippy::disallowed_methods)]
 
 #[path = "../../sim/examples/study/plot.rs"]
-#[allow(dead_code)]
 mod plot;
 
 use pelage::curves;

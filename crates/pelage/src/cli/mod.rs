@@ -152,17 +152,6 @@ pub struct Crop(pub [f64; 4]);
 #[derive(Clone, Copy, Debug)]
 pub struct Range(pub [f32; 2]);
 
-/// Pictures beside the still.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wanted {
-    /// The contact sheet.
-    Sheet,
-    /// One a frame.
-    Sequence,
-    /// From all sides.
-    Turntable,
-}
-
 /// A parsed list of frames.
 #[derive(Clone, Debug)]
 pub struct Frames(pub std::collections::BTreeSet<i32>);

@@ -1,6 +1,6 @@
 //! `pelage preview`: the pictures of a shot, or a part of its still.
 
-use super::{PreviewArguments, Wanted, print, run, watch};
+use super::{PreviewArguments, print, run, watch};
 use crate::Error;
 use crate::progress::Progress;
 use crate::project::Project;
@@ -15,12 +15,7 @@ pub fn preview(a: PreviewArguments) -> Result<bool, Error> {
         return watch::watch(&a);
     }
     if a.hairs.is_none() && a.crop.is_none() && a.show.is_none() {
-        let wanted = match (a.sequence, a.turntable) {
-            (true, _) => Wanted::Sequence,
-            (_, true) => Wanted::Turntable,
-            _ => Wanted::Sheet,
-        };
-        return run::pictures(a.run, wanted);
+        return run::pictures(&a);
     }
     run::threads(a.run.jobs)?;
     let project = Project::open(&a.run.shot)?;

@@ -1,6 +1,6 @@
 //! `pelage run`, `pelage plan`, `pelage preview`.
 
-use super::{RunArguments, Wanted, print};
+use super::{PreviewArguments, RunArguments, print};
 use crate::Error;
 use crate::config::ExportFormat;
 use crate::files::write_whole;
@@ -29,30 +29,23 @@ pub fn run(a: RunArguments) -> Result<bool, Error> {
     bring(&a, &project, options)
 }
 
-/// Makes pictures of a shot and what they need, no files.
-pub fn pictures(a: RunArguments, wanted: Wanted) -> Result<bool, Error> {
-    threads(a.jobs)?;
-    let project = Project::open(&a.shot)?;
-    let mut options = Options { without: Some(Stage::Export), ..options(&a) };
+/// Makes the still and the contact sheet of a shot, or a sequence, or a turntable, and what they need; no files.
+pub fn pictures(a: &PreviewArguments) -> Result<bool, Error> {
+    threads(a.run.jobs)?;
+    let project = Project::open(&a.run.shot)?;
     let (still, sheet) = (project.still_frame(), project.sheet_frames());
-    let framed = || project.shot.value.preview.camera.is_none().then(|| sheet.clone()).into_iter().flatten();
-    let mut frames = options.frames.take();
-    options.pictures = match wanted {
-        Wanted::Sheet => {
-            frames.get_or_insert_with(|| sheet.iter().copied().chain([still]).collect());
-            Pictures::Sheet
-        }
-        Wanted::Turntable => {
-            frames = Some([still].into());
-            Pictures::Turntable
-        }
-        Wanted::Sequence => {
-            let drawn = frames.take().unwrap_or_else(|| project.frames.keys().copied().collect());
-            frames = Some(drawn.iter().copied().chain(framed()).collect());
-            Pictures::Sequence(drawn)
-        }
+    let all = options(&a.run);
+    let (pictures, frames) = if a.sequence {
+        let drawn = all.frames.clone().unwrap_or_else(|| project.frames.keys().copied().collect());
+        let framed = if project.shot.value.preview.camera.is_none() { sheet } else { Vec::new() };
+        let frames = drawn.iter().copied().chain(framed).collect();
+        (Pictures::Sequence(drawn), frames)
+    } else if a.turntable {
+        (Pictures::Turntable, [still].into())
+    } else {
+        (Pictures::Sheet, all.frames.clone().unwrap_or_else(|| sheet.into_iter().chain([still]).collect()))
     };
-    bring(&a, &project, Options { frames, ..options })
+    bring(&a.run, &project, Options { pictures, frames: Some(frames), without: Some(Stage::Export), ..all })
 }
 
 fn bring(a: &RunArguments, project: &Project, options: Options) -> Result<bool, Error> {

@@ -139,9 +139,8 @@ impl Document<ShotFile> {
         if p.zoom.is_some_and(|zoom| !(zoom.is_finite() && zoom > 0.0)) {
             return bad("preview.zoom", "must be above 0", "1 shows everything");
         }
-        for (key, pictures) in [("preview.sheet", p.sheet), ("preview.turntable", p.turntable)] {
-            if !(1..=1000).contains(&pictures) || (key == "preview.sheet" && pictures > 100) {
-                let most = if key == "preview.sheet" { 100 } else { 1000 };
+        for (key, pictures, most) in [("preview.sheet", p.sheet, 100), ("preview.turntable", p.turntable, 1000)] {
+            if !(1..=most).contains(&pictures) {
                 return bad(key, &format!("must be between 1 and {most} pictures"), "");
             }
         }

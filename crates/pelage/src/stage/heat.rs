@@ -33,44 +33,45 @@ pub enum Column {
 /// Names of columns as they are typed.
 pub const COLUMNS: &str = "length, density, width, opacity, strain, penetration, transmittance, transmittance:LIGHT, clump, clump:LEVEL, wetness";
 
+/// Columns that are named by a word alone.
+const PLAIN: [(&str, Column); 7] = [
+    ("length", Column::Length),
+    ("density", Column::Density),
+    ("width", Column::Width),
+    ("opacity", Column::Opacity),
+    ("strain", Column::Strain),
+    ("penetration", Column::Penetration),
+    ("wetness", Column::Wetness),
+];
+
 impl std::str::FromStr for Column {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Column, String> {
+        if let Some((_, column)) = PLAIN.into_iter().find(|(name, _)| *name == text) {
+            return Ok(column);
+        }
         let (name, of) = text.split_once(':').map_or((text, None), |(name, of)| (name, Some(of)));
-        Ok(match (name, of) {
-            ("length", None) => Column::Length,
-            ("density", None) => Column::Density,
-            ("width", None) => Column::Width,
-            ("opacity", None) => Column::Opacity,
-            ("strain", None) => Column::Strain,
-            ("penetration", None) => Column::Penetration,
-            ("wetness", None) => Column::Wetness,
-            ("transmittance", light) => Column::Transmittance(light.map(str::to_owned)),
-            ("clump", None) => Column::Clump(0),
-            ("clump", Some(level)) => {
-                Column::Clump(level.parse().map_err(|_| format!("`{level}` is not a level: 0, 1 ..."))?)
+        match name {
+            "transmittance" => Ok(Column::Transmittance(of.map(str::to_owned))),
+            "clump" => {
+                let level = of.unwrap_or("0");
+                level.parse().map(Column::Clump).map_err(|_| format!("`{level}` is not a level: 0, 1 ..."))
             }
-            _ => return Err(format!("`{text}` is not a column: {COLUMNS}")),
-        })
+            _ => Err(format!("`{text}` is not a column: {COLUMNS}")),
+        }
     }
 }
 
 impl std::fmt::Display for Column {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Column::Length => "length",
-            Column::Density => "density",
-            Column::Width => "width",
-            Column::Opacity => "opacity",
-            Column::Strain => "strain",
-            Column::Penetration => "penetration",
-            Column::Wetness => "wetness",
-            Column::Transmittance(None) => "transmittance",
-            Column::Transmittance(Some(light)) => return write!(f, "transmittance-{light}"),
-            Column::Clump(0) => "clump",
-            Column::Clump(level) => return write!(f, "clump-{level}"),
-        })
+        match self {
+            Column::Transmittance(Some(light)) => write!(f, "transmittance-{light}"),
+            Column::Transmittance(None) => f.write_str("transmittance"),
+            Column::Clump(0) => f.write_str("clump"),
+            Column::Clump(level) => write!(f, "clump-{level}"),
+            plain => f.write_str(PLAIN.iter().find(|(_, c)| c == plain).map_or("", |(name, _)| name)),
+        }
     }
 }
 
@@ -112,7 +113,7 @@ pub fn column(run: &mut Runner<'_>, column: &Column, frame: i32) -> Result<Heat,
 fn of_layer(run: &mut Runner<'_>, column: &Column, i: usize, frame: i32) -> Result<Vec<f32>, Error> {
     let unit = run.project.shot.value.shot.meters_per_unit;
     if *column == Column::Density {
-        let per = run_cm2(unit) / run.project.share[i] as f32;
+        let per = (1.0 / (run.project.cm2_per_unit2() * run.project.share[i])) as f32;
         return Ok(shadow::density(run, i)?.into_iter().map(|d| d * per).collect());
     }
     let (layer, hairs) = (export::thickness(run, i)?, interpolate::hairs(run, What::Frame(i, frame))?);
@@ -134,11 +135,6 @@ fn of_layer(run: &mut Runner<'_>, column: &Column, i: usize, frame: i32) -> Resu
     })
 }
 
-/// Square scene units of a square centimetre, inverted.
-fn run_cm2(unit: f64) -> f32 {
-    (1e-4 / (unit * unit)) as f32
-}
-
 fn per_hair(offsets: &Offsets, value: impl Fn(std::ops::Range<usize>) -> f64 + Sync) -> Vec<f32> {
     (0..offsets.len()).into_par_iter().map(|h| value(offsets.range(h)) as f32).collect()
 }
@@ -155,9 +151,11 @@ fn penetration(run: &mut Runner<'_>, frame: i32) -> Result<Vec<Vec<f32>>, Error>
     let pose = groom::pose(run, &at)?;
     let bvh = barrier.closed.bvh(&barrier.closed.extend(&pose.position));
     let mm = 1e3 * run.project.shot.value.shot.meters_per_unit;
+    // As collision sees it; asked once before many threads do.
+    bvh.is_folded();
     let depth = |p: &[f32; 3]| {
         let p = Vec3::from(origin) + Vec3::from(p.map(f64::from));
-        bvh.closest(p, f64::INFINITY).map_or(0.0, |c| (-c.signed_distance).max(0.0) * mm) as f32
+        bvh.closest_outside(p, f64::INFINITY).map_or(0.0, |c| (-c.signed_distance).max(0.0) * mm) as f32
     };
     let of = |run: &mut Runner<'_>, i| {
         Ok(interpolate::hairs(run, What::Frame(i, frame))?.position.par_iter().map(depth).collect())

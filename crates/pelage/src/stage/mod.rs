@@ -8,6 +8,7 @@ mod look;
 mod plan;
 mod plan_light;
 mod plan_look;
+mod plan_picture;
 mod plan_simulate;
 mod run;
 mod skin;

@@ -22,6 +22,12 @@ pub fn is_shadowed(project: &Project, l: usize, frame: i32, written: bool) -> bo
     (!written || written_lights(project).contains(&l)) && project.shot.value.light[l].is_on(frame)
 }
 
+/// Shadows that a file of a frame reads (`written`), or a picture of it.
+pub fn shadows(project: &Project, frame: i32, written: bool) -> impl Iterator<Item = What> {
+    let all = 0..project.shot.value.light.len();
+    all.filter(move |l| is_shadowed(project, *l, frame, written)).map(move |l| What::Shadow(l as u32, frame))
+}
+
 /// How shadows are made: maps, or rays where exact ones are asked for.
 pub fn settings(shadow: &Shadow) -> Option<ShadowSettings> {
     match (shadow.error, shadow.quality.unwrap_or_default()) {

@@ -2,9 +2,9 @@
 
 use super::look::Displaced;
 use super::plan_light::source;
-use super::plan_look::acting_clumps;
+use super::plan_look::{acting_clumps, is_wet};
 use super::run::Runner;
-use super::{Skin, SkinPose, What, clumps, curves, export, groom, heat, instance, interpolate, layer_seed, shadow};
+use super::{SkinPose, What, clumps, curves, export, groom, heat, instance, interpolate, layer_seed, shadow};
 use crate::Error;
 use crate::config::{Keyed, PreviewTone, UpAxis, Vector};
 use crate::files::unfinished;
@@ -104,10 +104,10 @@ fn seen(run: &mut Runner<'_>, part: &Part) -> Result<Image, Error> {
     let (frame, size) = (run.project.still_frame(), run.project.shot.value.preview.size);
     let drawn = drawn(run, part.hairs)?;
     let camera = camera(run, &drawn, &[frame], frame)?;
-    let region = part.region(size);
+    let seen = Seen { camera, frame, size, region: part.region(size) };
     match &part.show {
-        Some(show) => heat_map(run, &drawn, &camera, frame, size, &region, show),
-        None => draw(run, &drawn, &camera, frame, size, &region),
+        Some(show) => heat_map(run, &drawn, &seen, show),
+        None => draw(run, &drawn, &seen),
     }
 }
 
@@ -120,7 +120,8 @@ pub fn sheet(run: &mut Runner<'_>) -> Result<(), Error> {
     let mut pictures = Vec::new();
     for frame in &frames {
         let camera = camera(run, &drawn, &frames, *frame)?;
-        let mut picture = draw(run, &drawn, &camera, *frame, size, &whole)?.shrunk(FINER as usize);
+        let seen = Seen { camera, frame: *frame, size, region: whole.clone() };
+        let mut picture = draw(run, &drawn, &seen)?.shrunk(FINER as usize);
         let dot = (picture.width / 320).max(1);
         picture.draw_text(&frame.to_string(), [2, picture.height as i64 - 9 * dot as i64], dot);
         pictures.push(picture);
@@ -134,7 +135,7 @@ pub fn picture(run: &mut Runner<'_>, frame: i32) -> Result<(), Error> {
     let (drawn, size) = (drawn(run, 100.0)?, run.project.shot.value.preview.size);
     let framed = run.project.sheet_frames();
     let camera = camera(run, &drawn, &framed, frame)?;
-    let picture = draw(run, &drawn, &camera, frame, size, &Part::default().region(size))?;
+    let picture = draw(run, &drawn, &Seen { camera, frame, size, region: Part::default().region(size) })?;
     save(run, What::Picture(frame), &format!("preview.{frame:04}.png"), &picture)
 }
 
@@ -142,22 +143,16 @@ pub fn picture(run: &mut Runner<'_>, frame: i32) -> Result<(), Error> {
 pub fn turn(run: &mut Runner<'_>, k: u32) -> Result<(), Error> {
     let (frame, size) = (run.project.still_frame(), run.project.shot.value.preview.size);
     let drawn = drawn(run, 100.0)?;
-    let p = run.project.shot.value.preview.clone();
-    let (camera, axis) = match &p.camera {
+    let count = run.project.shot.value.preview.turntable;
+    let (camera, axis) = match &run.project.shot.value.preview.camera {
         Some(_) => {
             let camera = camera(run, &drawn, &[frame], frame)?;
             (camera, camera.target)
         }
-        None => {
-            let points = points(run, &drawn, &[frame])?;
-            let (camera, axis) =
-                Camera::frame_turning(&points, p.from().map(|x| -x), up(run), aspect(run), p.turntable);
-            (camera.zoomed(p.zoom()), axis)
-        }
+        None => turning(run, &drawn, frame, count)?,
     };
-    let angle = std::f64::consts::TAU * f64::from(k) / f64::from(p.turntable);
-    let camera = camera.turned(axis, up(run), angle);
-    let picture = draw(run, &drawn, &camera, frame, size, &Part::default().region(size))?;
+    let camera = camera.turned(axis, up(run), std::f64::consts::TAU * f64::from(k) / f64::from(count));
+    let picture = draw(run, &drawn, &Seen { camera, frame, size, region: Part::default().region(size) })?;
     save(run, What::Turn(k), &format!("turntable.{:03}.png", k + 1), &picture)
 }
 
@@ -237,6 +232,17 @@ fn camera(run: &mut Runner<'_>, drawn: &Drawn, frames: &[i32], frame: i32) -> Re
     Ok(camera)
 }
 
+/// A camera that sees skin and hair at a frame from all sides on its way round, and a point of the line that it goes round.
+fn turning(run: &mut Runner<'_>, drawn: &Drawn, frame: i32, turns: u32) -> Result<(Camera, [f64; 3]), Error> {
+    if let Some(found) = run.turning {
+        return Ok(found);
+    }
+    let points = points(run, drawn, &[frame])?;
+    let p = &run.project.shot.value.preview;
+    let (camera, axis) = Camera::frame_turning(&points, p.from().map(|x| -x), up(run), aspect(run), turns);
+    Ok(*run.turning.insert((camera.zoomed(p.zoom()), axis)))
+}
+
 fn aspect(run: &Runner<'_>) -> f64 {
     let [w, h] = run.project.shot.value.preview.size.map(f64::from);
     w / h
@@ -307,19 +313,43 @@ fn strands(run: &mut Runner<'_>, drawn: &Drawn, i: usize, frame: i32) -> Result<
     Ok(Strands { hairs, width, opacity, normal })
 }
 
-/// Draws a region of the picture of `size` at a frame.
-fn draw(
-    run: &mut Runner<'_>,
-    drawn: &Drawn,
-    camera: &Camera,
+/// A region of a picture of `size` at a frame, and the camera.
+struct Seen {
+    camera: Camera,
     frame: i32,
     size: [u32; 2],
-    region: &Region,
-) -> Result<Image, Error> {
+    region: Region,
+}
+
+impl Seen {
+    /// Draws hair and skin.
+    fn render(
+        &self,
+        run: &mut Runner<'_>,
+        layers: &[HairView<'_>],
+        lights: &[Light],
+        skin: [f32; 3],
+        settings: &Settings,
+    ) -> Result<Image, Error> {
+        let posed = pose(run, self.frame)?.map(|pose| Ok::<_, Error>((groom::skin(run)?, pose))).transpose()?;
+        let skin = posed.as_ref().map(|(mesh, pose)| SkinView {
+            position: &pose.position,
+            triangle: &mesh.mesh.triangle,
+            normal: &pose.normal,
+            color: skin,
+        });
+        let scene = Scene { skin, layers, lights, background: BACKGROUND };
+        Ok(render_region(&scene, &self.camera, self.size.map(|x| x as usize), &self.region, settings).0)
+    }
+}
+
+/// Draws hair in its light.
+fn draw(run: &mut Runner<'_>, drawn: &Drawn, seen: &Seen) -> Result<Image, Error> {
+    let frame = seen.frame;
     let count = drawn.layers.len();
     let strands = (0..count).map(|i| strands(run, drawn, i, frame)).collect::<Result<Vec<_>, Error>>()?;
     let gloss = (0..count).map(|i| gloss(run, drawn, i, frame)).collect::<Result<Vec<_>, Error>>()?;
-    let Lit { lights, transmittance } = lights(run, drawn, camera, frame)?;
+    let Lit { lights, transmittance } = lights(run, drawn, &seen.camera, frame)?;
     let origin = run.origin()?;
     let views: Vec<HairView<'_>> = (0..count)
         .map(|i| HairView {
@@ -339,11 +369,7 @@ fn draw(
         ..standard
     };
     let settings = Settings { hair, depth_cue: p.depth_cue as f32, ..Settings::default() };
-    let pose = pose(run, frame)?;
-    let skin = pose.as_ref().map(|_| groom::skin(run)).transpose()?;
-    let skin = skin.as_ref().zip(pose.as_ref()).map(|(skin, pose)| surface(skin, pose, SKIN));
-    let scene = Scene { skin, layers: &views, lights: &lights, background: BACKGROUND };
-    Ok(render_region(&scene, camera, size.map(|x| x as usize), region, &settings).0.exposed(exposure))
+    Ok(seen.render(run, &views, &lights, SKIN, &settings)?.exposed(exposure))
 }
 
 fn view<'a>(layer: &'a HairLayer, strands: &'a Strands, origin: [f64; 3]) -> HairView<'a> {
@@ -361,52 +387,30 @@ fn view<'a>(layer: &'a HairLayer, strands: &'a Strands, origin: [f64; 3]) -> Hai
     }
 }
 
-fn surface<'a>(skin: &'a Skin, pose: &'a SkinPose, color: [f32; 3]) -> SkinView<'a> {
-    SkinView { position: &pose.position, triangle: &skin.mesh.triangle, normal: &pose.normal, color }
-}
-
 /// Draws a column of the hairs as colours, with a legend.
-fn heat_map(
-    run: &mut Runner<'_>,
-    drawn: &Drawn,
-    camera: &Camera,
-    frame: i32,
-    size: [u32; 2],
-    region: &Region,
-    show: &Show,
-) -> Result<Image, Error> {
-    let heat::Heat { values, title, scale } = heat::column(run, &show.column, frame)?;
+fn heat_map(run: &mut Runner<'_>, drawn: &Drawn, seen: &Seen, show: &Show) -> Result<Image, Error> {
+    let heat::Heat { values, title, scale } = heat::column(run, &show.column, seen.frame)?;
     let range = show.range.unwrap_or_else(|| range_of(values.iter().flatten().copied()));
     let paint = |v: f32| match scale {
         true => heat_color(v, range),
         false if v < 0.0 => NO_VALUE,
         false => category_color(v as u64),
     };
-    let mut layers = Vec::new();
-    let mut all = Vec::new();
-    for (i, layer) in drawn.layers.iter().enumerate() {
-        let values = &values[i];
-        let colors: Vec<[f32; 3]> = match values.len() == drawn.all[i].len() {
-            true => values.iter().step_by(drawn.every).map(|v| paint(*v)).collect(),
-            false => nth(values, &drawn.all[i], drawn.every).map(paint).collect(),
-        };
-        layers.push(HairLayer {
-            color: colors,
-            width: layer.width.clone(),
-            offsets: layer.offsets.clone(),
-            ..HairLayer::default()
-        });
-        all.push(strands(run, drawn, i, frame)?);
-    }
+    let colors = |i: usize| -> Vec<[f32; 3]> {
+        match values[i].len() == drawn.all[i].len() {
+            true => values[i].iter().step_by(drawn.every).map(|v| paint(*v)).collect(),
+            false => nth(&values[i], &drawn.all[i], drawn.every).map(paint).collect(),
+        }
+    };
+    let count = drawn.layers.len();
+    let colors: Vec<Vec<[f32; 3]>> = (0..count).map(colors).collect();
+    let strands = (0..count).map(|i| strands(run, drawn, i, seen.frame)).collect::<Result<Vec<_>, Error>>()?;
     let origin = run.origin()?;
-    let views: Vec<HairView<'_>> = layers.iter().zip(&all).map(|(l, s)| view(l, s, origin)).collect();
+    let of = |i: usize| HairView { color: &colors[i], ..view(&drawn.layers[i], &strands[i], origin) };
+    let views: Vec<HairView<'_>> = (0..count).map(of).collect();
     // Light from all around shows colours as they are.
     let settings = Settings { ambient: [1.0; 3], ..Settings::default() };
-    let pose = pose(run, frame)?;
-    let skin = pose.as_ref().map(|_| groom::skin(run)).transpose()?;
-    let skin = skin.as_ref().zip(pose.as_ref()).map(|(skin, pose)| surface(skin, pose, BARE));
-    let scene = Scene { skin, layers: &views, lights: &[], background: BACKGROUND };
-    let mut picture = render_region(&scene, camera, size.map(|x| x as usize), region, &settings).0;
+    let mut picture = seen.render(run, &views, &[], BARE, &settings)?;
     picture.draw_legend(&title, scale.then_some(range));
     Ok(picture)
 }
@@ -420,11 +424,11 @@ struct Gloss {
 
 fn gloss(run: &mut Runner<'_>, drawn: &Drawn, i: usize, frame: i32) -> Result<Gloss, Error> {
     let shade = run.project.shot.value.preview.shade.clone();
-    let all = interpolate::hairs(run, What::Frame(i, frame))?;
     let guard = run.project.groom.value.layer[i].guard.clone().filter(|_| run.project.curves.is_none());
-    if guard.is_none() && all.wet.is_empty() && shade.wetness == 0.0 {
+    if guard.is_none() && !is_wet(run.project, i) && shade.wetness == 0.0 {
         return Ok(Gloss::default());
     }
+    let all = interpolate::hairs(run, What::Frame(i, frame))?;
     let hairs = drawn.all[i].len();
     let wet: Vec<f32> = (0..hairs).map(|h| all.wet.get(h).map_or(0.0, |w| w[2]).max(shade.wetness as f32)).collect();
     let mut shine: Vec<f32> = wet.iter().map(|w| 1.0 + (WET_SHINE - 1.0) * w).collect();

@@ -102,6 +102,8 @@ pub struct Runner<'a> {
     pub(super) hits: Option<(i32, Rc<super::areas::Hits>)>,
     /// The camera that frames the hairs of some frames.
     pub(super) camera: Option<(Vec<i32>, pelage_light::Camera)>,
+    /// The camera of the turntable at its beginning, and a point of the line that it goes round.
+    pub(super) turning: Option<(pelage_light::Camera, [f64; 3])>,
     pub(super) placed: Option<pelage_groom::control::ControlHairs>,
     pub(super) control: Option<Rc<pelage_groom::control::ControlHairs>>,
     pub(super) curves: Option<Rc<super::curves::CurveHair>>,
@@ -148,6 +150,7 @@ impl<'a> Runner<'a> {
             props: None,
             hits: None,
             camera: None,
+            turning: None,
             placed: None,
             control: None,
             curves: None,
@@ -244,10 +247,8 @@ impl<'a> Runner<'a> {
         if self.options.force == Some(step.stage) {
             return false;
         }
-        match step.what {
-            What::Export(_) | What::Still | What::Sheet | What::Picture(_) | What::Turn(_) => {
-                super::export::is_written(self, step)
-            }
+        match step.stage {
+            Stage::Export | Stage::Preview => super::export::is_written(self, step),
             _ => self.store.contains(&step.recipe.key()),
         }
     }

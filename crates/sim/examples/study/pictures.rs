@@ -2,9 +2,9 @@
 
 use crate::Write;
 use crate::common::{Shot, still};
-use crate::plot::drawing;
 use pelage_sim::{Body, End, Material, Root, Settings, Span};
 use std::f64::consts::{PI, TAU};
+use std::fmt::Write as _;
 
 const FRAME: f64 = 1.0 / 24.0;
 
@@ -124,4 +124,43 @@ pub fn draw(write: Write) {
     }
     let title = "More waves, dropped: after 0, 2/24, 4/24, 3 s (dark); stiffness x 4";
     write("hair-waviness", drawing(title, &panels));
+}
+
+/// Hairs side by side as projected lines, each panel with a caption. Coordinates: right, up.
+fn drawing(title: &str, panels: &[(String, Vec<Vec<[f64; 2]>>)]) -> String {
+    let each = 190.0;
+    let width = each * panels.len() as f64 + 20.0;
+    let mut bound = [f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY, f64::NEG_INFINITY];
+    for p in panels.iter().flat_map(|p| p.1.iter().flatten()) {
+        bound = [bound[0].min(p[0]), bound[1].max(p[0]), bound[2].min(p[1]), bound[3].max(p[1])];
+    }
+    let scale = ((each - 24.0) / (bound[1] - bound[0])).min((330.0 - 80.0) / (bound[3] - bound[2]));
+    let height = 80.0 + scale * (bound[3] - bound[2]);
+    let mut out = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" \
+         font-size=\"12\"><rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\
+         <text x=\"14\" y=\"24\" font-size=\"15\" font-weight=\"bold\">{title}</text>\n"
+    );
+    for (k, (caption, lines)) in panels.iter().enumerate() {
+        let x0 = 10.0 + each * (k as f64 + 0.5) - 0.5 * scale * (bound[0] + bound[1]);
+        let y0 = 42.0 + scale * bound[3];
+        for (i, line) in lines.iter().enumerate() {
+            let path: Vec<String> =
+                line.iter().map(|p| format!("{:.1},{:.1}", x0 + scale * p[0], y0 - scale * p[1])).collect();
+            // Later lines are darker.
+            let grey = if lines.len() > 1 { 190 - 170 * i / (lines.len() - 1) } else { 20 };
+            let _ = writeln!(
+                out,
+                "<polyline points=\"{}\" fill=\"none\" stroke=\"rgb({grey},{grey},{grey})\" stroke-width=\"1.6\"/>",
+                path.join(" ")
+            );
+        }
+        let _ = writeln!(
+            out,
+            "<text x=\"{:.1}\" y=\"{}\" text-anchor=\"middle\">{caption}</text>",
+            10.0 + each * (k as f64 + 0.5),
+            height - 12.0
+        );
+    }
+    out + "</svg>\n"
 }
