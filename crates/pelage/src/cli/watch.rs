@@ -57,7 +57,7 @@ struct Seen {
 impl Seen {
     fn read(shot: &Path) -> Result<Seen, Error> {
         let project = Project::open(shot)?;
-        let key = Plan::new(&project).step(What::Still).recipe.key();
+        let key = Plan::new(&project).step(What::Still).key.clone();
         let text = |path: &Path, text: &str| (project.label(path), blake3::hash(text.as_bytes()).to_hex().to_string());
         let mut inputs: BTreeMap<String, String> =
             project.inputs().into_iter().map(|f| (f.label.clone(), f.hash.clone())).collect();

@@ -27,7 +27,7 @@ struct Receipt {
 /// True if the files of a step lie in the output folder as they were written.
 pub fn is_written(run: &Runner<'_>, step: &Step) -> bool {
     let out = run.project.out_dir();
-    let Some(entry) = run.store.get(&step.recipe.key()) else { return false };
+    let Some(entry) = run.store.get(&step.key) else { return false };
     let receipts: Option<Vec<Receipt>> = entry.payload.first().and_then(|b| serde_json::from_slice(b).ok());
     receipts.is_some_and(|r| {
         r.iter().all(|r| {

@@ -3,7 +3,7 @@
 use super::Stage;
 use super::plan_light::shadows;
 use super::plan_look::finished_rest;
-use crate::cache::{Field, Recipe};
+use crate::cache::{Field, Key, Recipe};
 use crate::config::{Comb, ExportFormat, Feature, MapRef, Parting, Target};
 use crate::project::{Project, SkinAt};
 use crate::timeline::Timeline;
@@ -69,6 +69,8 @@ pub struct Step {
     pub stage: Stage,
     /// Everything it reads.
     pub recipe: Recipe,
+    /// Its recipe's key: others read it many times.
+    pub key: Key,
     /// The steps it reads.
     pub reads: Vec<What>,
 }
@@ -228,14 +230,14 @@ impl Plan {
     pub(super) fn add(&mut self, what: What, name: String, stage: Stage, mut recipe: Recipe, reads: &[What]) {
         for input in reads {
             let step = self.step(*input);
-            recipe = recipe.step(&step.name.clone(), &step.recipe.key());
+            recipe = recipe.step(&step.name.clone(), &step.key);
         }
-        self.push(Step { what, name, stage, recipe, reads: reads.to_vec() });
+        self.push(what, name, stage, recipe, reads.to_vec());
     }
 
-    pub(super) fn push(&mut self, step: Step) {
-        self.index.insert(step.what, self.steps.len());
-        self.steps.push(step);
+    pub(super) fn push(&mut self, what: What, name: String, stage: Stage, recipe: Recipe, reads: Vec<What>) {
+        self.index.insert(what, self.steps.len());
+        self.steps.push(Step { what, name, stage, key: recipe.key(), recipe, reads });
     }
 
     /// The step that makes something. Panics if the shot has no such step.
@@ -247,7 +249,7 @@ impl Plan {
     pub fn reasons(&self, what: What, last: &BTreeMap<String, Recipe>) -> Vec<String> {
         let step = self.step(what);
         let mut out = match last.get(&step.name) {
-            Some(before) if before.key() == step.recipe.key() => return Vec::new(),
+            Some(before) if before.key() == step.key => return Vec::new(),
             Some(before) => changes(&step.recipe, before),
             None => Vec::new(),
         };

@@ -71,12 +71,12 @@ impl Plan {
                     None => vec![("width", What::Width(i)), ("opacity", What::Opacity(i))],
                 };
                 for (role, what) in columns.into_iter().chain([("hairs", What::Frame(i, frame))]) {
-                    recipe = recipe.step(&format!("{role} of {}", layer.name), &self.step(what).recipe.key());
+                    recipe = recipe.step(&format!("{role} of {}", layer.name), &self.step(what).key);
                     reads.push(what);
                 }
             }
             let name = format!("shadow/{}/{frame}", light.name);
-            self.push(super::Step { what: What::Shadow(l as u32, frame), name, stage: Stage::Shadow, recipe, reads });
+            self.push(What::Shadow(l as u32, frame), name, Stage::Shadow, recipe, reads);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! What a stretch of the simulation reads.
 
 use super::Stage;
-use super::plan::{Plan, Reader, Step, What, version};
+use super::plan::{Plan, Reader, What, version};
 use crate::cache::{Key, Recipe};
 use crate::config::{BodyKind, Keyed, Target};
 use crate::project::{Project, SkinAt, SkinMotion};
@@ -15,15 +15,15 @@ impl Plan {
         let name = format!("simulate/{}/{}", r.project.groom.value.layer[i].name, frames.start());
         let mut reads = vec![hairs(r.project, i)];
         reads.extend((k > 0).then(|| What::Simulate(i, k - 1)));
-        self.push(Step { what: What::Simulate(i, k), name, stage: Stage::Simulate, recipe, reads });
+        self.push(What::Simulate(i, k), name, Stage::Simulate, recipe, reads);
     }
 
     /// Recipe of a stretch that ends with frame `end`. Layers do not enter by name: two that simulate the same control
     /// hairs alike share the result.
     fn stretch(&self, r: &Reader<'_>, timeline: &Timeline<'_>, i: usize, k: u32, end: i64) -> Recipe {
-        let mut recipe = r.stretch(timeline, i, k, end).step("hairs", &self.step(hairs(r.project, i)).recipe.key());
+        let mut recipe = r.stretch(timeline, i, k, end).step("hairs", &self.step(hairs(r.project, i)).key);
         if k > 0 {
-            recipe = recipe.step("before", &self.step(What::Simulate(i, k - 1)).recipe.key());
+            recipe = recipe.step("before", &self.step(What::Simulate(i, k - 1)).key);
         }
         recipe
     }

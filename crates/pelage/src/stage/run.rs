@@ -167,12 +167,12 @@ impl<'a> Runner<'a> {
 
     /// Payload of a finished step; `None` if it must run.
     pub fn fetch(&self, what: What) -> Option<Entry> {
-        if self.is_forced(what) { None } else { self.store.get(&self.plan.step(what).recipe.key()) }
+        if self.is_forced(what) { None } else { self.store.get(&self.plan.step(what).key) }
     }
 
     /// One payload file of a finished step; `None` if the step must run.
     pub fn fetch_file(&self, what: What, name: &str) -> Option<Vec<u8>> {
-        if self.is_forced(what) { None } else { self.store.file(&self.plan.step(what).recipe.key(), name) }
+        if self.is_forced(what) { None } else { self.store.file(&self.plan.step(what).key, name) }
     }
 
     /// True if a step runs whether its result is there or not.
@@ -249,7 +249,7 @@ impl<'a> Runner<'a> {
         }
         match step.stage {
             Stage::Export | Stage::Preview => super::export::is_written(self, step),
-            _ => self.store.contains(&step.recipe.key()),
+            _ => self.store.contains(&step.key),
         }
     }
 
@@ -332,7 +332,7 @@ impl<'a> Runner<'a> {
         }
         match (self.last.get(&step.name), step.stage) {
             (None, Stage::Export) => Some(format!("new: {}", step.name)),
-            (Some(last), stage) if last.key() == step.recipe.key() => Some(match stage {
+            (Some(last), stage) if last.key() == step.key => Some(match stage {
                 Stage::Export | Stage::Preview => format!("files of {} are missing or not as written", step.name),
                 stage => format!("results of {} are missing from the cache", stage.name()),
             }),
@@ -343,9 +343,7 @@ impl<'a> Runner<'a> {
     /// Frames that a whole-shot file still waits for.
     fn waits_for(&self, step: &Step) -> Vec<i32> {
         let absent = |w: &What| match w {
-            What::Frame(_, f) | What::Shadow(_, f) if !self.store.contains(&self.plan.step(*w).recipe.key()) => {
-                Some(*f)
-            }
+            What::Frame(_, f) | What::Shadow(_, f) if !self.store.contains(&self.plan.step(*w).key) => Some(*f),
             _ => None,
         };
         let frames: BTreeSet<i32> = step.reads.iter().filter_map(absent).collect();
@@ -464,7 +462,7 @@ impl<'a> Runner<'a> {
                 What::Finished(_) => Some(i32::MIN),
                 what => what.frame(),
             };
-            let found = self.ran.get(&step.what).cloned().or_else(|| self.store.counts(&step.recipe.key()));
+            let found = self.ran.get(&step.what).cloned().or_else(|| self.store.counts(&step.key));
             for (name, n) in found.unwrap_or_default() {
                 let moment = moment.filter(|_| !super::simulate::SUMMED.contains(&name.as_str()));
                 *moments.entry(moment).or_default().entry(name).or_default() += n;
