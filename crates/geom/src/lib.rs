@@ -9,6 +9,9 @@ pub mod map;
 pub mod mesh;
 pub mod motion;
 pub mod pose;
+pub mod registers;
+#[cfg(test)]
+mod registers_tests;
 pub mod ride;
 pub mod rng;
 pub mod shapes;

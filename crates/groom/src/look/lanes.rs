@@ -1,14 +1,23 @@
 //! Hairs side by side, one a lane: the same arithmetic in every lane, so the same bytes as one by one.
 //!
-//! All of it is inlined into kernels ([`registers::run`](super::registers::run)), which are compiled once for each width.
+//! All of it is inlined into kernels ([`run`]), which are compiled once for each width.
 
 // Arrays of lanes are walked side by side.
 #![allow(clippy::needless_range_loop)]
 
 use super::Param;
 use super::axes::RootAxes;
-pub(crate) use super::registers::{Bits, Kernel, LANES, Lanes, Pack, fetch, run};
+use pelage_geom::registers;
+pub(crate) use pelage_geom::registers::{Bits, Kernel, LANES, Lanes, Pack, run};
 use std::ops::{Add, Sub};
+
+/// Asks for numbers that are read soon. What comes after the first lines of the cache, the processor fetches by itself.
+#[inline(always)]
+pub(crate) fn fetch(numbers: &[f32]) {
+    for line in numbers.chunks(LANES).take(4) {
+        registers::fetch(line.first());
+    }
+}
 
 /// A vector in every lane, as it lies in memory.
 pub(crate) type Pack3 = [Pack; 3];

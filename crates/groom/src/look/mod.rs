@@ -14,9 +14,6 @@ pub mod noise;
 pub mod perlin;
 pub mod refine;
 pub mod region;
-mod registers;
-#[cfg(test)]
-mod registers_tests;
 pub mod vary;
 pub mod wave;
 pub mod wind;

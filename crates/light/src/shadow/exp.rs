@@ -1,6 +1,6 @@
 //! The exponential function without the platform's.
 
-use super::registers::Lanes;
+use pelage_geom::registers::{Bits, Lanes};
 
 /// exp(-x) in every lane: 2^(k + r) for the whole number k nearest to -x / ln 2, 2^r from a polynomial of degree 4 on
 /// [-1/2, 1/2]. The error is under 5e-6 for any x >= 0, relative to the result under 1.2e-5; from 87 on the result stays
@@ -17,7 +17,7 @@ pub(crate) fn exp_neg<L: Lanes>(x: L) -> L {
         p = p * r + L::splat(c);
     }
     // k into the exponent; what stands above it in the sum is shifted out.
-    p.scaled(shifted)
+    (p.bits() + shifted.bits().left::<23>()).numbers()
 }
 
 /// Coefficients of 2^r by rising degree, of the least relative error on [-1/2, 1/2] with 2^0 exact.
@@ -25,8 +25,8 @@ const POWER: [f32; 5] = [1.0, 0.693_124_2, 0.240_240_98, 0.055_906_48, 0.009_582
 
 #[cfg(test)]
 mod tests {
-    use super::super::registers::Plain;
     use super::*;
+    use pelage_geom::registers::Plain;
 
     #[test]
     fn is_near_the_exponential() {

@@ -1,8 +1,9 @@
 //! Segments as rows of equal deposits of optical depth.
 
 use super::bins::Segment;
-use super::registers::{LANES, Lanes, least, most};
+use super::numbers::{least, most, short};
 use super::slices::Slices;
+use pelage_geom::registers::{Bits, LANES, Lanes};
 use wide::f32x4;
 
 /// Widest segment that is drawn as one line, texels: the line has no width, and its depth lands up to half of this beside
@@ -244,8 +245,8 @@ impl Line {
         let t = L::splat(k as f32) + L::read(&COUNT);
         let (from, to) = (t.max(L::splat(self.from)), (t + L::splat(1.0)).min(L::splat(self.to)));
         let middle = (from + to) * L::splat(0.5);
-        let depth = ((to - from) * L::splat(self.each)).short();
-        let [x, y] = [self.at(0, middle, edge).whole(), self.at(1, middle, edge).whole()];
+        let depth = short((to - from) * L::splat(self.each));
+        let [x, y] = [self.at(0, middle, edge).whole().values(), self.at(1, middle, edge).whole().values()];
         Parts { x, y, row: self.at(2, middle, end), depth }
     }
 

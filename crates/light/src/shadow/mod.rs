@@ -18,11 +18,11 @@ mod bins;
 mod exact;
 mod exp;
 mod line;
+mod numbers;
+#[cfg(test)]
+mod numbers_tests;
 mod planes;
 mod project;
-mod registers;
-#[cfg(test)]
-mod registers_tests;
 mod sample;
 mod settings;
 mod slices;

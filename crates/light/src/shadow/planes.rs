@@ -1,9 +1,10 @@
 //! Optical depth over a tile, plane after plane away from the light.
 
 use super::line::{Line, Parts};
-use super::registers::{LANES, Lanes, depth_of, place_of};
+use super::numbers::{deposits, depth_of, place_of};
 use super::sample::SPARE;
 use super::slices::Slices;
+use pelage_geom::registers::{Bits, LANES, Lanes};
 
 /// Deposits that lie together. Larger blocks are less full, smaller ones need more of them.
 const BLOCK: usize = 64;
@@ -48,8 +49,8 @@ impl Deposits {
         let (mut word, mut row) = ([0u32; LANES], [0u32; LANES]);
         for k in (0..count).step_by(LANES) {
             let part: Parts<L> = line.parts(k, edge, last);
-            L::deposits(part.depth, part.y * L::splat(self.side) + part.x, &mut word);
-            part.row.write_whole(&mut row);
+            deposits(part.depth, part.y * L::splat(self.side) + part.x, &mut word);
+            part.row.whole().store(&mut row);
             if self.block.len() < self.next.len() + LANES {
                 self.block.resize(2 * self.block.len() + LANES, [0; BLOCK]);
             }

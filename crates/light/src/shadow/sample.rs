@@ -2,8 +2,9 @@
 
 use super::exp::exp_neg;
 use super::line::{Line, Parts};
-use super::registers::{LANES, Lanes, least, most};
+use super::numbers::{least, most};
 use super::slices::Slices;
+use pelage_geom::registers::{Bits, LANES, Lanes};
 use wide::f32x4;
 
 /// Texels of the widest footprint along a side.
@@ -186,8 +187,8 @@ impl Around<'_> {
                 let x = (part.x - L::splat(low[0])).max(L::splat(-1.0)).min(L::splat(size[0]));
                 let y = (part.y - L::splat(low[1])).max(L::splat(-1.0)).min(L::splat(size[1])) + L::splat(1.0);
                 // What lies before both the first row and the first column counts nowhere, as the row before the window.
-                (y * L::splat(ROW as f32) + x).max(L::splat(0.0)).write_whole(&mut place);
-                part.row.write_whole(&mut row);
+                (y * L::splat(ROW as f32) + x).max(L::splat(0.0)).whole().store(&mut place);
+                part.row.whole().store(&mut row);
                 part.depth.write(&mut depth);
                 for i in 0..(parts.end - k).min(LANES) {
                     let level = self.slices.level(row[i]) as f32;

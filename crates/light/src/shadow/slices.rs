@@ -1,6 +1,6 @@
 //! Where the slices of a tile lie.
 
-use super::registers::{least, most};
+use super::numbers::{least, most};
 use super::settings::Placement;
 
 /// Rows that the depths of a tile's points are divided into; a slice is a run of them. One is about a hair's width on a head

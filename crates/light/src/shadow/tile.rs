@@ -4,12 +4,12 @@ use super::bins::{Chunk, Segment};
 use super::line::Line;
 use super::planes::{Deposits, Planes};
 use super::project::Projection;
-use super::registers::{Kernel, Lanes, Width, fetch, run_at};
 use super::sample::{Around, Own, Taps, Window, dark};
 use super::settings::{Interpolation, ShadowSettings};
 use super::slices::Slices;
 use super::solid::{self, Cover, Solid};
 use super::{ShadowHair, TILE};
+use pelage_geom::registers::{Kernel, Lanes, Width, fetch, run_at};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Points ahead for which memory is asked for: lists jump about in memory.

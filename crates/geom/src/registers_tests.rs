@@ -2,8 +2,8 @@
 // Arrays of lanes are walked side by side.
 #![allow(clippy::needless_range_loop)]
 
-use super::registers::*;
-use pelage_geom::rng;
+use crate::registers::*;
+use crate::rng;
 
 struct Everything<'a>(&'a [Pack; 3], &'a [u32; LANES]);
 
@@ -34,11 +34,15 @@ impl Kernel for Everything<'_> {
             if L::any_gt(a, b) { one } else { a },
             L::pick(self.0, i & L::Bits::splat(3)),
             L::pick(self.0, i),
+            a.max(L::splat(0.0)).min(L::splat(65_535.0)).whole().values(),
         ];
-        let mut out = vec![Pack::default(); all.len()];
+        let mut out = vec![Pack::default(); all.len() + 1];
         for (v, p) in all.iter().zip(&mut out) {
             v.store(p);
         }
+        let mut words = [0; LANES];
+        (i ^ j).store(&mut words);
+        out[all.len()] = Pack(words.map(|w| (w >> 8) as f32));
         out
     }
 }

@@ -1,10 +1,11 @@
 //! Every width gives the same bits.
 
 use super::exp::exp_neg;
-use super::registers::*;
+use super::numbers::*;
+use pelage_geom::registers::*;
 use pelage_geom::rng;
 
-struct Everything<'a>(&'a [Pack; 2]);
+struct Everything<'a>(&'a [[f32; LANES]; 2]);
 
 impl Kernel for Everything<'_> {
     type Out = Vec<[u32; LANES]>;
@@ -18,11 +19,11 @@ impl Kernel for Everything<'_> {
             a * b,
             a.max(b),
             a.min(b),
-            small.whole(),
-            a.short(),
+            small.whole().values(),
+            short(a),
             exp_neg(small),
             exp_neg(b.max(L::splat(-80.0))),
-            small.scaled(b),
+            (small.bits() + b.bits().left::<23>()).numbers(),
         ];
         let mut out = vec![[0; LANES]; all.len() + 2];
         for (v, p) in all.iter().zip(&mut out) {
@@ -30,8 +31,8 @@ impl Kernel for Everything<'_> {
             v.write(&mut pack);
             *p = pack.map(|v| if v.is_nan() { 0 } else { v.to_bits() });
         }
-        small.write_whole(&mut out[all.len()]);
-        L::deposits(b.short(), small.whole(), &mut out[all.len() + 1]);
+        small.whole().store(&mut out[all.len()]);
+        deposits(short(b), small.whole().values(), &mut out[all.len() + 1]);
         out
     }
 }
@@ -45,7 +46,7 @@ fn every_width_gives_the_same_bits() {
             let odd = [f32::INFINITY, f32::NAN, 0.0, -0.0];
             if u < 0.08 { odd[(u * 50.0) as usize] } else { (u - 0.3) * scale }
         };
-        let packs: [Pack; 2] = std::array::from_fn(|i| std::array::from_fn(|l| value((i * LANES + l) as u64)));
+        let packs: [[f32; LANES]; 2] = std::array::from_fn(|i| std::array::from_fn(|l| value((i * LANES + l) as u64)));
         let plain = run_at(Width::Plain, Everything(&packs));
         for width in Width::ALL {
             assert_eq!(run_at(width, Everything(&packs)), plain, "{width:?} at step {step}");
@@ -55,13 +56,13 @@ fn every_width_gives_the_same_bits() {
 
 #[test]
 fn deposits_keep_place_and_depth() {
-    let depth: Pack = std::array::from_fn(|i| libm::exp2f(i as f32 * 2.1 - 24.0) * 1.2345);
-    let place: Pack = std::array::from_fn(|i| (i * 4369) as f32);
+    let depth: [f32; LANES] = std::array::from_fn(|i| libm::exp2f(i as f32 * 2.1 - 24.0) * 1.2345);
+    let place: [f32; LANES] = std::array::from_fn(|i| (i * 4369) as f32);
     let mut word = [0; LANES];
-    let short = Plain::read(&depth).short();
-    Plain::deposits(short, Plain::read(&place), &mut word);
+    let kept_depth = short(Plain::read(&depth));
+    deposits(kept_depth, Plain::read(&place), &mut word);
     let mut kept = [0.0; LANES];
-    short.write(&mut kept);
+    kept_depth.write(&mut kept);
     for i in 0..LANES {
         assert_eq!((place_of(word[i]), depth_of(word[i])), (i * 4369, kept[i]));
         assert!((kept[i] / depth[i].min(255.0) - 1.0).abs() < 2.5e-4, "{} {}", depth[i], kept[i]);
