@@ -5,6 +5,7 @@
 #![allow(clippy::disallowed_methods)]
 
 use pelage_geom::{Offsets, Vec3, rng};
+use pelage_light::shadow::{ShadowHair, ShadowSettings, Source, transmittance};
 use pelage_light::{Camera, HairView, Scene, Settings, SkinView, render, studio_lights};
 use std::hint::black_box;
 use std::time::Instant;
@@ -13,14 +14,14 @@ const SIZE: [usize; 2] = [1280, 960];
 const RUNS: usize = 5;
 
 fn main() {
-    println!("{:>8} {:>7} {:>8} {:>10} {:>10}", "hairs", "points", "threads", "best s", "median s");
-    for (hairs, points) in [(0, 2), (25_000, 12), (100_000, 25)] {
-        measure(hairs, points);
+    println!("{:>8} {:>7} {:>6} {:>8} {:>10} {:>10}", "hairs", "points", "maps", "threads", "best s", "median s");
+    for (hairs, points, maps) in [(0, 2, false), (25_000, 12, false), (100_000, 25, false), (100_000, 25, true)] {
+        measure(hairs, points, maps);
     }
 }
 
-/// Times one case: hairs of two radii all over a ball, bent downwards.
-fn measure(hairs: usize, points: usize) {
+/// Times one case: hairs of two radii all over a ball, bent downwards; with `maps`, what reaches them of each light is known.
+fn measure(hairs: usize, points: usize, maps: bool) {
     let u = |id: usize, k: u64| rng::uniform(1, id as u64, 2, k);
     let mut position = Vec::with_capacity(hairs * points);
     let mut normal: Vec<[f32; 3]> = Vec::with_capacity(hairs);
@@ -38,23 +39,33 @@ fn measure(hairs: usize, points: usize) {
         normal.push(n.cast::<f32>().into());
     }
     let offsets = Offsets::uniform(hairs, points);
+    let camera = Camera::frame(([-1.4, -2.0, -1.4], [1.4; 3]), [-0.4, -0.2, -1.0], [0.0, 1.0, 0.0], 4.0 / 3.0);
+    let lights = studio_lights(&camera);
+    let width = vec![0.002; position.len()];
+    let shadow = ShadowHair { offsets: &offsets, position: &position, origin: [0.0; 3], width: &width, opacity: &[] };
+    let known: Vec<Vec<f32>> = lights[..if maps { lights.len() } else { 0 }]
+        .iter()
+        .map(|l| {
+            let source = Source::Directional { direction: Vec3::from(l.direction) };
+            let (mut light, _) = transmittance(source, &[shadow], &[], &ShadowSettings::default()).expect("a light");
+            light.remove(0)
+        })
+        .collect();
     let layers = [HairView {
         offsets: &offsets,
         position: &position,
         origin: [0.0; 3],
-        width: &vec![0.002; position.len()],
+        width: &width,
         color: &[],
         opacity: &[],
         root_normal: &normal,
         shine: &[],
         side: &[],
-        transmittance: &[],
+        transmittance: &known,
     }];
     let (vertex, triangle) = ball(120);
     let smooth: Vec<[f32; 3]> = vertex.iter().map(|p| p.map(|v| v as f32)).collect();
     let skin = SkinView { position: &vertex, triangle: &triangle, normal: &smooth, color: [0.42, 0.31, 0.26] };
-    let camera = Camera::frame(([-1.4, -2.0, -1.4], [1.4; 3]), [-0.4, -0.2, -1.0], [0.0, 1.0, 0.0], 4.0 / 3.0);
-    let lights = studio_lights(&camera);
     let scene = Scene { skin: Some(skin), layers: &layers, lights: &lights, background: [0.16; 3] };
     for threads in [1, 2] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
@@ -66,7 +77,7 @@ fn measure(hairs: usize, points: usize) {
             })
             .collect();
         seconds.sort_by(f64::total_cmp);
-        println!("{hairs:>8} {points:>7} {threads:>8} {:>10.3} {:>10.3}", seconds[0], seconds[RUNS / 2]);
+        println!("{hairs:>8} {points:>7} {maps:>6} {threads:>8} {:>10.3} {:>10.3}", seconds[0], seconds[RUNS / 2]);
     }
 }
 

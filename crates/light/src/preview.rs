@@ -5,11 +5,11 @@
 //! near to far, so that covered pixels cost nothing and tiles are independent of each other.
 
 use crate::hair::{Chunk, Draw, Scratch, Tiling};
-use crate::raster::{Facet, Filter, Point, TILE, Tile};
+use crate::raster::{Facet, Filter, Piece, Point, Strokes, TILE, Tile};
 use crate::shade::{HairModel, HairPoint, LightDir, fade, to_light};
 use crate::slab::{HUGE, Slabs};
 use crate::{Camera, HairShade, Image, Light, V3, View, camera};
-use pelage_geom::{Offsets, Vec3};
+use pelage_geom::{Offsets, Vec3, registers};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -347,36 +347,21 @@ pub fn render_region(
     let lighting = Lighting::new(scene, camera, &view, settings);
     let (facets, facet_bins) = facets(scene, &view, &tiling, &mut counts);
     let draw = Draw { view: &view, lighting: &lighting, tiling, cue: cue(scene, &view, settings.depth_cue) };
-    let (points, opacity, mut lines) = lines(scene, &draw, &mut counts);
+    let lines = lines(scene, &draw, &mut counts);
     let filter = Filter::new();
-    let tiles = tiling.count();
-    let mut rest = lines.1.as_mut_slice();
-    let mut jobs = Vec::with_capacity(tiles);
-    for t in 0..tiles {
-        let (own, after) = std::mem::take(&mut rest).split_at_mut(lines.0[t + 1] - lines.0[t]);
-        if tiling.is_drawn(t) {
-            jobs.push((t, own));
-        }
-        rest = after;
-    }
-    let drawn: Vec<Vec<[f32; 3]>> = jobs
+    let tiles: Vec<usize> = (0..tiling.count()).filter(|t| tiling.is_drawn(*t)).collect();
+    let drawn: Vec<Vec<[f32; 3]>> = tiles
         .into_par_iter()
-        .map(|(t, order)| {
+        // Some tiles cost many times as much as others.
+        .with_max_len(1)
+        .map(|t| {
             let (x, y) = (t % tiling.across * TILE, t / tiling.across * TILE);
             let mut tile = Tile::new(x, y, TILE.min(width - x), TILE.min(height - y));
             for &f in &facet_bins.1[facet_bins.0[t]..facet_bins.0[t + 1]] {
                 tile.facet(&facets[f as usize], !view.parallel);
             }
-            order.sort_unstable();
-            for &key in order.iter() {
-                if tile.full() {
-                    break;
-                }
-                let i = key as u32 as usize;
-                let (a, b) = (&points[i], &points[i + 1]);
-                let size = 1.0 / view.scale(f64::from(a.z.min(b.z))) as f32;
-                tile.line(a, b, opacity[a.strand as usize], size, &filter);
-            }
+            let (order, points, opacity) = (&lines.of(t)[..], &lines.points[..], &lines.opacity[..]);
+            registers::run(Strokes { tile: &mut tile, order, points, opacity, view: &view, filter: &filter });
             tile.resolve(scene.background, |triangle, at, depth| {
                 skin_color(scene, &view, &lighting, triangle, at, depth)
             })
@@ -423,9 +408,30 @@ fn bin<T: Copy + Default>(tiles: usize, pairs: impl Iterator<Item = (u32, T)> + 
     (start, list)
 }
 
-/// Points of all hairs in the picture, opacity per strand, and for each tile the keys of its pieces: depth in the upper
-/// half, first point in the lower. Keys are distinct, so sorting them gives one order only.
-fn lines(scene: &Scene, draw: &Draw, counts: &mut RenderCounts) -> (Vec<Point>, Vec<f32>, Bins<u64>) {
+/// Hairs in the picture.
+struct Lines {
+    /// Points, by chunk of strands.
+    points: Vec<Vec<Point>>,
+    /// Pieces by tile in each chunk: bits of their depth, and first point.
+    pieces: Vec<Bins<[u32; 2]>>,
+    /// Opacity per strand.
+    opacity: Vec<f32>,
+}
+
+impl Lines {
+    /// A tile's pieces, near to far. No two are alike, so sorting them gives one order only.
+    fn of(&self, tile: usize) -> Vec<Piece> {
+        let mut all: Vec<Piece> = Vec::new();
+        for (chunk, (start, list)) in (0u32..).zip(&self.pieces) {
+            all.extend(list[start[tile]..start[tile + 1]].iter().map(|[depth, point]| [*depth, chunk, *point]));
+        }
+        all.sort_unstable();
+        all
+    }
+}
+
+/// Shades all hairs and cuts them to pieces.
+fn lines(scene: &Scene, draw: &Draw, counts: &mut RenderCounts) -> Lines {
     let mut jobs: Vec<(&HairView, Range<usize>, usize)> = Vec::new();
     let mut opacity = Vec::with_capacity(counts.hairs);
     for layer in scene.layers {
@@ -438,25 +444,20 @@ fn lines(scene: &Scene, draw: &Draw, counts: &mut RenderCounts) -> (Vec<Point>, 
         for s in strands.clone() {
             draw.strand(layer, s, (first + s) as u32, &mut scratch, &mut chunk);
         }
-        chunk
+        let piece = |&(tile, i): &(u32, u32)| {
+            let z = 0.5 * (chunk.points[i as usize].z + chunk.points[i as usize + 1].z);
+            (tile, [z.to_bits(), i])
+        };
+        let pieces = bin(draw.tiling.count(), chunk.bins.iter().map(piece));
+        ((chunk.points, pieces), [chunk.pieces, chunk.bad_points])
     };
-    let chunks: Vec<Chunk> = jobs.par_iter().map(work).collect();
-    let mut points = Vec::with_capacity(chunks.iter().map(|c| c.points.len()).sum());
-    let mut starts = Vec::with_capacity(chunks.len());
-    for c in &chunks {
-        starts.push(points.len() as u32);
-        points.extend_from_slice(&c.points);
-        counts.pieces += c.pieces;
-        counts.bad_points += c.bad_points;
+    let (lists, sums): (Vec<_>, Vec<[usize; 2]>) = jobs.par_iter().with_max_len(1).map(work).unzip();
+    for [pieces, bad_points] in sums {
+        counts.pieces += pieces;
+        counts.bad_points += bad_points;
     }
-    let keys = chunks.iter().zip(&starts).flat_map(|(c, &start)| {
-        c.bins.iter().map(move |&(tile, i)| {
-            let z = 0.5 * (c.points[i as usize].z + c.points[i as usize + 1].z);
-            (tile, u64::from(z.to_bits()) << 32 | u64::from(start + i))
-        })
-    });
-    let bins = bin(draw.tiling.count(), keys);
-    (points, opacity, bins)
+    let (points, pieces) = lists.into_iter().unzip();
+    Lines { points, pieces, opacity }
 }
 
 /// Triangles in the picture, cut at the near plane, and for each tile the list of those that touch it.

@@ -1,9 +1,13 @@
-//! Drawing into one tile: skin triangles with eight depth samples a pixel, then hairs as filtered lines, near to far.
+//! One tile of the picture: skin triangles with eight depth samples a pixel, behind the hairs that `stroke` draws.
+
+mod stroke;
+
+pub(crate) use stroke::{Filter, Piece, REACH, Strokes};
 
 use crate::V3;
 
-/// Side of a tile, pixels. A tile's pixels (96 bytes each) should stay in the second-level cache: at 64, 384 KB. Much
-/// smaller tiles repeat lines that cross their borders.
+/// Side of a tile, pixels. What lines touch of a tile (32 bytes a pixel, 128 KB) should stay in the second-level
+/// cache. Much smaller tiles repeat lines that cross their borders.
 pub(crate) const TILE: usize = 64;
 
 /// No triangle, no strand.
@@ -27,52 +31,12 @@ const SAMPLE: [[f64; 2]; SAMPLES] = [
 /// Part of a pixel that a sample stands for.
 const SHARE: f32 = 1.0 / SAMPLES as f32;
 
-/// Standard deviation of the pixel filter. A Gaussian of 0.52 pixels leaves ripples of 1 % at most in the coverage of a
-/// thin line; 0.45 leaves 4 %, which shows as beads and moire, 0.7 is visibly soft.
-const SIGMA: f32 = 0.52;
-
-/// Where the filter ends, pixels: a whole number of table steps.
-pub(crate) const REACH: f32 = 1.5;
-
-/// Steps of the table per pixel.
-const STEPS: usize = 128;
-
 /// A pixel through which less light than this comes takes no more hairs: what is so deep is dark, so the error is
 /// under half a step of 8 bits. At 1/50 dense hair gets holes to the background.
 const OPAQUE: f32 = 1.0 / 400.0;
 
-/// How far behind the skin's depth sample a hair may be and still show, pixels at its depth. Roots lie in the skin and
-/// the sample of a sloping skin is up to a pixel beside the hair: under 1, roots flicker; over 4, hair shines through
-/// ears and lips.
-const BIAS: f32 = 1.5;
-
 /// A sample this little outside a triangle, in barycentric coordinates, counts as inside: no cracks from rounding.
 const EDGE: f64 = -1e-9;
-
-/// Integral of the pixel filter: a Gaussian cut at [`REACH`] and scaled to an area of exactly 1, isotropic, so that the
-/// coverage of a line does not depend on its angle or its place between pixels.
-#[derive(Clone, Debug)]
-pub(crate) struct Filter {
-    table: Vec<f32>,
-}
-
-impl Filter {
-    pub fn new() -> Filter {
-        let half = (REACH * STEPS as f32) as i32;
-        let at = |i: i32| libm::erf(f64::from(i) / STEPS as f64 / f64::from(SIGMA) * std::f64::consts::FRAC_1_SQRT_2);
-        let full = at(half);
-        Filter { table: (-half..=half + 1).map(|i| (0.5 + 0.5 * at(i.min(half)) / full) as f32).collect() }
-    }
-
-    /// Integral from minus infinity to `x` pixels.
-    #[inline]
-    fn upto(&self, x: f32) -> f32 {
-        let x = (x.clamp(-REACH, REACH) + REACH) * STEPS as f32;
-        let i = x as i32 as usize;
-        let (a, b) = (self.table[i], self.table[i + 1]);
-        a + (b - a) * (x - i as f32)
-    }
-}
 
 /// A point of a hair in the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -91,18 +55,23 @@ pub(crate) struct Point {
     pub strand: u32,
 }
 
-/// State of one pixel.
+/// State of one pixel. Most have all their samples alike: those are kept as one.
 #[derive(Clone, Copy, Debug)]
-#[repr(align(64))]
+#[repr(align(32))]
 struct Pixel {
     /// Colour of the hairs so far, linear, weighted by what is seen of them.
     rgb: [f32; 3],
     /// Strand drawn last, and how much of the pixel it covers by now.
     strand: u32,
     covered: f32,
-    /// Per sample: part of the light from behind that comes through the hairs so far.
-    through: [f32; SAMPLES],
+    /// Part of the light from behind that comes through the hairs so far, at every sample; [`MIXED`] if samples differ.
+    through: f32,
+    /// Least depth of the skin at a sample.
+    near: f32,
 }
+
+/// Says that samples of a pixel differ, and stand in [`Tile::through`].
+const MIXED: f32 = -1.0;
 
 /// A triangle of the skin in the picture: corners as (x pixels, y pixels, depth).
 #[derive(Clone, Copy, Debug)]
@@ -119,6 +88,8 @@ pub(crate) struct Tile {
     width: usize,
     height: usize,
     pixel: Vec<Pixel>,
+    /// Per pixel and sample: as [`Pixel::through`] where that is [`MIXED`].
+    through: Vec<[f32; SAMPLES]>,
     /// Per pixel and sample: depth of the skin, scene units.
     depth: Vec<[f32; SAMPLES]>,
     /// Per row a bit for each pixel through which more can be seen.
@@ -132,13 +103,14 @@ pub(crate) struct Tile {
 impl Tile {
     /// An empty tile: its pixel (0, 0) is (x0, y0) of the picture.
     pub fn new(x0: usize, y0: usize, width: usize, height: usize) -> Tile {
-        let pixel = Pixel { rgb: [0.0; 3], strand: NOBODY, covered: 0.0, through: [1.0; SAMPLES] };
+        let pixel = Pixel { rgb: [0.0; 3], strand: NOBODY, covered: 0.0, through: 1.0, near: f32::INFINITY };
         Tile {
             x0,
             y0,
             width,
             height,
             pixel: vec![pixel; width * height],
+            through: vec![[1.0; SAMPLES]; width * height],
             depth: vec![[f32::INFINITY; SAMPLES]; width * height],
             open: [ones(width); TILE],
             left: width * height,
@@ -180,61 +152,9 @@ impl Tile {
                             self.triangle = vec![[NOBODY; SAMPLES]; self.width * self.height];
                         }
                         self.depth[k][s] = z;
+                        self.pixel[k].near = self.pixel[k].near.min(z);
                         self.triangle[k][s] = facet.triangle;
                     }
-                }
-            }
-        }
-    }
-
-    /// Blends the piece of a hair from `a` to `b` behind what is there already. `opacity` is that of its whole width,
-    /// `pixel_size` scene units per pixel at its depth. The coverage of a pixel is the filtered area of a rectangle of
-    /// the true width: a hair of a tenth of a pixel covers a tenth.
-    pub fn line(&mut self, a: &Point, b: &Point, opacity: f32, pixel_size: f32, filter: &Filter) {
-        let (ax, ay) = (a.x - self.x0 as f32, a.y - self.y0 as f32);
-        let (dx, dy) = (b.x - a.x, b.y - a.y);
-        let length = (dx * dx + dy * dy).sqrt();
-        let (ux, uy) = if length > 1e-6 { (dx / length, dy / length) } else { (1.0, 0.0) };
-        let side = REACH + 0.5 * a.width.max(b.width);
-        let per = if length > 1e-6 { 1.0 / length } else { 0.0 };
-        let half = [0.5 * a.width, 0.5 * (b.width - a.width)];
-        let bias = BIAS * pixel_size;
-        let tall = uy.abs() * REACH + ux.abs() * side;
-        let Some((top, bottom)) = centres(ay.min(ay + dy) - tall, ay.max(ay + dy) + tall, self.height) else { return };
-        for j in top..=bottom {
-            if self.open[j] == 0 {
-                continue;
-            }
-            let ry = j as f32 + 0.5 - ay;
-            // Across: |ux ry - uy rx| <= side. Along: -REACH <= ux rx + uy ry <= length + REACH.
-            let (mut lo, mut hi) = (-ax, self.width as f32 - ax);
-            if uy.abs() > 1e-6 {
-                let (m, r) = (ux * ry / uy, side / uy.abs());
-                (lo, hi) = (lo.max(m - r), hi.min(m + r));
-            }
-            if ux.abs() > 1e-6 {
-                let (s, e) = ((-REACH - uy * ry) / ux, (length + REACH - uy * ry) / ux);
-                (lo, hi) = (lo.max(s.min(e)), hi.min(s.max(e)));
-            }
-            let Some((first, last)) = centres(lo + ax, hi + ax, self.width) else { continue };
-            let mut todo = self.open[j] & ones(last + 1) & !ones(first);
-            while todo != 0 {
-                let i = todo.trailing_zeros() as usize;
-                todo &= todo - 1;
-                let rx = i as f32 + 0.5 - ax;
-                let (across, along) = (ux * ry - uy * rx, ux * rx + uy * ry);
-                let f = (along * per).clamp(0.0, 1.0);
-                let h = half[0] + half[1] * f;
-                let mut cover = filter.upto(across + h) - filter.upto(across - h);
-                if along < REACH || along > length - REACH {
-                    cover *= filter.upto(along) - filter.upto(along - length);
-                }
-                let rgb = std::array::from_fn(|c| a.rgb[c] + (b.rgb[c] - a.rgb[c]) * f);
-                let k = j * self.width + i;
-                let z = a.z + (b.z - a.z) * f - bias;
-                if self.pixel[k].blend(rgb, cover * opacity, z, &self.depth[k], a.strand) < OPAQUE {
-                    self.open[j] &= !(1 << i);
-                    self.left -= 1;
                 }
             }
         }
@@ -244,14 +164,15 @@ impl Tile {
     pub fn resolve(&self, background: [f32; 3], skin: impl Fn(u32, [f64; 2], f32) -> V3) -> Vec<[f32; 3]> {
         let finish = |(k, p): (usize, &Pixel)| {
             let seen = self.triangle.get(k).copied().unwrap_or([NOBODY; SAMPLES]);
-            if seen == [NOBODY; SAMPLES] && p.through == [1.0; SAMPLES] {
+            let through = if p.through == MIXED { self.through[k] } else { [p.through; SAMPLES] };
+            if seen == [NOBODY; SAMPLES] && through == [1.0; SAMPLES] {
                 return background;
             }
             let mut rgb = V3::from(p.rgb);
             // The last triangle and its colour: samples of one triangle share one.
             let mut known = (NOBODY, V3::from(background));
             for ((&triangle, &through), (&depth, at)) in
-                seen.iter().zip(&p.through).zip(self.depth[k].iter().zip(&SAMPLE))
+                seen.iter().zip(&through).zip(self.depth[k].iter().zip(&SAMPLE))
             {
                 if triangle == NOBODY {
                     rgb += V3::from(background) * (SHARE * through);
@@ -269,28 +190,42 @@ impl Tile {
     }
 }
 
-impl Pixel {
-    /// Puts a coverage of colour behind what is there, at the samples whose skin is not nearer than `z`. Coverages of one
-    /// strand add up, where those of different strands multiply what is left: pieces of a hair lie side by side, so
+impl Tile {
+    /// Puts a coverage of colour behind what is in pixel `k`, at the samples whose skin is not nearer than `z`. Coverages
+    /// of one strand add up, where those of different strands multiply what is left: pieces of a hair lie side by side, so
     /// a hair looks the same however many pieces it has. Returns what comes through at most.
     #[inline]
-    fn blend(&mut self, rgb: [f32; 3], alpha: f32, z: f32, depth: &[f32; SAMPLES], strand: u32) -> f32 {
-        if self.strand != strand {
-            (self.strand, self.covered) = (strand, 0.0);
+    fn blend(&mut self, k: usize, rgb: [f32; 3], alpha: f32, z: f32, strand: u32) -> f32 {
+        let p = &mut self.pixel[k];
+        if p.strand != strand {
+            (p.strand, p.covered) = (strand, 0.0);
         }
-        let rest = 1.0 - self.covered;
+        let rest = 1.0 - p.covered;
         let part = if rest > 1e-4 { (alpha / rest).min(1.0) } else { 0.0 };
-        let open = depth.map(|d| if z <= d { 1.0f32 } else { 0.0 });
-        let taken: [f32; SAMPLES] = std::array::from_fn(|s| self.through[s] * part * open[s]);
-        let left: [f32; SAMPLES] = std::array::from_fn(|s| self.through[s] - taken[s]);
-        self.through = left;
-        self.covered += SHARE * alpha * sum(&open);
-        let seen = SHARE * sum(&taken);
-        for (sum, c) in self.rgb.iter_mut().zip(rgb) {
+        let (open, seen, most);
+        if p.through != MIXED && z <= p.near {
+            // All samples alike: the same numbers as below, as eighths of eight like ones are exact.
+            seen = p.through * part;
+            p.through -= seen;
+            (open, most) = (1.0, p.through);
+        } else {
+            let through = &mut self.through[k];
+            if p.through != MIXED {
+                *through = [p.through; SAMPLES];
+                p.through = MIXED;
+            }
+            let is_open = self.depth[k].map(|d| if z <= d { 1.0f32 } else { 0.0 });
+            let taken: [f32; SAMPLES] = std::array::from_fn(|s| through[s] * part * is_open[s]);
+            *through = std::array::from_fn(|s| through[s] - taken[s]);
+            (open, seen) = (SHARE * sum(&is_open), SHARE * sum(&taken));
+            let half: [f32; SAMPLES / 2] = std::array::from_fn(|s| through[s].max(through[s + SAMPLES / 2]));
+            most = (half[0].max(half[2])).max(half[1].max(half[3]));
+        }
+        p.covered += alpha * open;
+        for (sum, c) in p.rgb.iter_mut().zip(rgb) {
             *sum += seen * c;
         }
-        let half: [f32; SAMPLES / 2] = std::array::from_fn(|s| left[s].max(left[s + SAMPLES / 2]));
-        (half[0].max(half[2])).max(half[1].max(half[3]))
+        most
     }
 }
 
@@ -304,19 +239,6 @@ fn sum(v: &[f32; SAMPLES]) -> f32 {
 /// The lowest `n` bits.
 fn ones(n: usize) -> u64 {
     if n >= 64 { u64::MAX } else { (1 << n) - 1 }
-}
-
-/// First and last of `size` pixels whose centres lie in [low, high].
-#[inline]
-fn centres(low: f32, high: f32, size: usize) -> Option<(usize, usize)> {
-    let (low, high) = ((low - 0.5).max(0.0), high - 0.5);
-    if !(high >= low && low < size as f32) {
-        return None;
-    }
-    let first = low as usize;
-    let first = if (first as f32) < low { first + 1 } else { first };
-    let last = (high as usize).min(size - 1);
-    (first <= last).then_some((first, last))
 }
 
 /// Twice the area of the triangle a, b, p.

@@ -8,6 +8,7 @@ use crate::preview::SkinView;
 use crate::slab::{Affine, Box3};
 use crate::{V3, View};
 use pelage_geom::Vec3;
+use rayon::prelude::*;
 
 /// Texels along the longer side of the map. Half of it loses nostrils and eyelids, twice as many cost four times the
 /// memory and time and show no difference in a picture of 1280 pixels.
@@ -63,7 +64,7 @@ pub(crate) struct SkinMap {
 impl SkinMap {
     /// Looks at a skin along the last of the unit `axis`; `None` without a finite vertex.
     pub fn new(skin: &SkinView, axis: [Vec3; 3], view: &View) -> Option<SkinMap> {
-        let mut cells = Box3::around(axis, TEXELS, skin.position.iter().map(|&p| Vec3::from(p)))?;
+        let mut cells = Box3::around(axis, TEXELS, skin.position.par_iter().map(|&p| Vec3::from(p)))?;
         cells.per_unit = [cells.per_unit[0].min(cells.per_unit[1]); 3];
         let depth = nearest(skin, &cells);
         let half = TEXELS / 2;

@@ -7,6 +7,7 @@ use crate::preview::{Scene, in_layer};
 use crate::skin_map::SkinMap;
 use crate::{V3, View};
 use pelage_geom::Vec3;
+use pelage_geom::registers::fetch;
 use rayon::prelude::*;
 
 /// Cells along each axis of the grid. Fewer lose the parting and the locks; twice as many cost eight times the memory
@@ -31,17 +32,17 @@ pub(crate) struct Box3 {
 
 impl Box3 {
     /// Bounds of points along `axis`, cut into `cells` each way; `None` without a finite point.
-    pub fn around(axis: [Vec3; 3], cells: usize, points: impl Iterator<Item = Vec3>) -> Option<Box3> {
-        let (mut lo, mut hi) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for p in points {
-            let c = axis.map(|a| a.dot(&p));
-            if c.iter().all(|v| v.abs() < HUGE) {
-                for i in 0..3 {
-                    lo[i] = lo[i].min(c[i]);
-                    hi[i] = hi[i].max(c[i]);
-                }
-            }
-        }
+    pub fn around(axis: [Vec3; 3], cells: usize, points: impl ParallelIterator<Item = Vec3>) -> Option<Box3> {
+        let none = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        let join = |(a, b): ([f64; 3], [f64; 3]), (c, d): ([f64; 3], [f64; 3])| {
+            (std::array::from_fn(|i| a[i].min(c[i])), std::array::from_fn(|i| b[i].max(d[i])))
+        };
+        // Least and most are the same in any order.
+        let (lo, hi) = points
+            .map(|p| axis.map(|a| a.dot(&p)))
+            .filter(|c| c.iter().all(|v| v.abs() < HUGE))
+            .fold(|| none, |bounds, c| join(bounds, (c, c)))
+            .reduce(|| none, join);
         let largest = (0..3).map(|i| hi[i] - lo[i]).fold(f64::NEG_INFINITY, f64::max);
         if largest < 0.0 {
             return None;
@@ -101,7 +102,7 @@ impl Slabs {
         let x = if z.x.abs() < 0.6 { Vec3::x() } else { Vec3::y() };
         let x = (x - z * z.dot(&x)).normalize();
         let axis = [x, z.cross(&x), z];
-        let points = scene.layers.iter().flat_map(|l| l.position.iter().map(|p| in_layer(l, p)));
+        let points = scene.layers.par_iter().flat_map(|l| l.position.par_iter().map(|p| in_layer(l, p)));
         let hair = Box3::around(axis, CELLS, points).map(|b| (b.seen_by(view), hair_grid(scene, &b)));
         let skin = scene.skin.as_ref().and_then(|s| SkinMap::new(s, axis, view));
         Slabs { hair, skin }
@@ -146,12 +147,20 @@ fn split(x: f32) -> (usize, f32) {
 fn hair_grid(scene: &Scene, cells: &Box3) -> Vec<f32> {
     let part = |k: usize| {
         let mut grid = vec![0.0f32; CELLS * CELLS * CELLS];
+        // Hairs lie all over the grid: each is added when the next one has been looked at, and its cells are near by.
+        let (mut now, mut next) = (Vec::new(), Vec::new());
         for layer in scene.layers {
             let n = layer.offsets.len();
             for s in n * k / PARTS..n * (k + 1) / PARTS {
-                splat(layer, s, cells, &mut grid);
+                splat(layer, s, cells, |cell, depth| {
+                    fetch(grid.get(cell));
+                    next.push((cell, depth));
+                });
+                add(&mut grid, &mut now);
+                std::mem::swap(&mut now, &mut next);
             }
         }
+        add(&mut grid, &mut now);
         grid
     };
     let parts: Vec<Vec<f32>> = (0..PARTS).into_par_iter().map(part).collect();
@@ -166,28 +175,42 @@ fn hair_grid(scene: &Scene, cells: &Box3) -> Vec<f32> {
     blur(&blur(&sum, 1), CELLS)
 }
 
-/// Adds one strand to the grid: its true projected area, spread along it at less than a cell's distance.
-fn splat(layer: &crate::HairView, s: usize, cells: &Box3, grid: &mut [f32]) {
+/// Adds to cells and empties the list.
+fn add(grid: &mut [f32], cells: &mut Vec<(usize, f32)>) {
+    for (cell, depth) in cells.drain(..) {
+        grid[cell] += depth;
+    }
+}
+
+/// What one strand adds to cells of the grid: its true projected area, spread along it at less than a cell's distance.
+fn splat(layer: &crate::HairView, s: usize, cells: &Box3, mut emit: impl FnMut(usize, f32)) {
     let range = layer.offsets.range(s);
     let opacity = layer.opacity(s);
-    let per_area = cells.per_unit[0] * cells.per_unit[1];
+    // What a cell's side is worth along the one axis, where area counts in cells.
+    let [by_u, by_v] = [cells.per_unit[1], cells.per_unit[0]].map(|v| v as f32);
+    let place = |i: usize| {
+        let p = layer.position.get(i).map_or([0.0; 3], |p| cells.place(in_layer(layer, p)));
+        (p.map(|v| v as f32), layer.width(i))
+    };
+    let mut b = place(range.start);
     for i in range.start + 1..range.end.min(layer.position.len()) {
-        let [a, b] = [i - 1, i].map(|i| cells.place(in_layer(layer, &layer.position[i])));
-        let d: [f64; 3] = std::array::from_fn(|c| b[c] - a[c]);
-        let long = d.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        let a = std::mem::replace(&mut b, place(i));
+        let d: [f32; 3] = std::array::from_fn(|c| b.0[c] - a.0[c]);
+        let long = d.iter().fold(0.0f32, |m, v| m.max(v.abs()));
         if !long.is_finite() {
             continue;
         }
-        // Length seen from the light, scene units.
-        let (u, v) = (d[0] / cells.per_unit[0], d[1] / cells.per_unit[1]);
-        let width = f64::from(0.5 * (layer.width(i - 1) + layer.width(i)));
         let steps = ((long * 1.2) as usize).min(4 * CELLS) + 1;
-        let each = ((u * u + v * v).sqrt() * width * per_area) as f32 * opacity / steps as f32;
+        let step = 1.0 / steps as f32;
+        // Length seen from the light times width.
+        let (u, v) = (d[0] * by_u, d[1] * by_v);
+        let each = (u * u + v * v).sqrt() * (0.5 * (a.1 + b.1)) * opacity * step;
         for k in 0..steps {
-            let f = (k as f64 + 0.5) / steps as f64;
-            let c: [f64; 3] = std::array::from_fn(|i| a[i] + d[i] * f);
-            if c.iter().all(|v| *v >= 0.0 && *v < CELLS as f64) {
-                grid[(c[1] as usize * CELLS + c[0] as usize) * CELLS + c[2] as usize] += each;
+            let f = (k as f32 + 0.5) * step;
+            let c: [f32; 3] = std::array::from_fn(|i| a.0[i] + d[i] * f);
+            if c.iter().all(|v| *v >= 0.0 && *v < CELLS as f32) {
+                let [x, y, z] = c.map(|v| v as u32 as usize);
+                emit((y * CELLS + x) * CELLS + z, each);
             }
         }
     }

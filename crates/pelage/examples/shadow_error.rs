@@ -80,7 +80,7 @@ fn main() {
         ("", of(1024, 128)),
         ("", of(2048, 64)),
         ("", of(2048, 128)),
-        ("", of(2048, 512)),
+        ("", of(2048, 256)),
         ("", of(4096, 256)),
     ] {
         println!("{name:8} {}", measure(&settings).line());
@@ -128,7 +128,7 @@ fn sweep(name: &str, measure: &dyn Fn(&ShadowSettings) -> Found) {
             lines.push(plot::Series { mark, ..plot::Series::new(label, points) });
         }
     };
-    const SLICES: [usize; 5] = [16, 32, 64, 128, 256];
+    const SLICES: [usize; 6] = [16, 32, 64, 128, 256, 384];
     let slices = |texels: usize, placement| {
         SLICES.map(|slices| ShadowSettings { texels, slices, placement, ..default }).to_vec()
     };

@@ -1,6 +1,7 @@
 //! Segments sorted into the tiles they touch.
 
 use super::line::{part_over, thickness};
+use super::numbers::{least, most};
 use super::project::{Place, Projection};
 use super::{ShadowHair, TILE};
 use rayon::prelude::*;
@@ -70,8 +71,18 @@ pub(crate) struct Segment {
 impl Segment {
     /// The part that may reach a square of `side` texels from zero on. Slices are placed for what lies over a tile: where
     /// the rest of a long segment lies says nothing, and depths between its ends would be taken for slices between theirs.
+    #[inline(always)]
     pub fn over(&self, side: f32) -> Option<Segment> {
         let (a, b, margin) = (self.a, self.b, 0.5 * self.width + 1.0);
+        let in_square = |p: &[f32; 3]| least(p[0], p[1]) >= -margin && most(p[0], p[1]) < side + margin;
+        if in_square(&a) && in_square(&b) {
+            return Some(*self);
+        }
+        self.cut(side, margin)
+    }
+
+    fn cut(&self, side: f32, margin: f32) -> Option<Segment> {
+        let (a, b) = (self.a, self.b);
         let [from, to] = part_over(&a, &b, -margin, side + margin)?;
         let at = |t: f32| std::array::from_fn(|i| a[i] + (b[i] - a[i]) * t);
         Some(Segment { a: if from > 0.0 { at(from) } else { a }, b: if to < 1.0 { at(to) } else { b }, ..*self })

@@ -38,11 +38,11 @@ use bins::{Chunk, chunks};
 use pelage_geom::{Offsets, Vec3};
 use project::{Projection, fit};
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 
-/// Side of a tile, texels. Half of it repeats the work of twice as many segments that cross borders (a quarter more time);
-/// twice as much no longer lets a tile's deposits and planes stay in the second-level cache.
-pub(crate) const TILE: usize = 64;
+/// Side of a tile, texels. Half of it repeats the work of segments that cross borders (a tenth more time); with twice as much
+/// the places of a tile's texels no longer fit the 16 bits of a deposit.
+pub(crate) const TILE: usize = 128;
 
 /// Where light comes from: world space, scene units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -173,12 +173,19 @@ fn face(
         }
     }
     let cover = solid::Cover::new(solids, projection);
-    let done = (0..grid * grid)
+    // Each thread takes the next tile that is left: some cost many times as much as others.
+    let next = AtomicUsize::new(0);
+    let done = (0..rayon::current_num_threads())
         .into_par_iter()
-        .map_init(
-            || tile::Work::new(projection, settings, solids, &cover),
-            |work, t| work.run(&chunks, layers, [t % grid, t / grid], t, cells),
-        )
+        .with_max_len(1)
+        .map(|_| {
+            let mut work = tile::Work::new(projection, settings, solids, &cover);
+            let tiles =
+                std::iter::repeat_with(|| next.fetch_add(1, Ordering::Relaxed)).take_while(|t| *t < grid * grid);
+            tiles
+                .map(|t| work.run(&chunks, layers, [t % grid, t / grid], t, cells))
+                .fold(tile::Done::default(), tile::Done::and)
+        })
         .reduce(tile::Done::default, tile::Done::and);
     counts.behind_solid += done.hidden;
     counts.texels = projection.texels;

@@ -3,8 +3,9 @@
 use super::line::{Line, Parts};
 use super::numbers::{deposits, depth_of, place_of};
 use super::sample::SPARE;
+use super::settings::Interpolation;
 use super::slices::Slices;
-use pelage_geom::registers::{Bits, LANES, Lanes};
+use pelage_geom::registers::{Bits, LANES, Lanes, fetch};
 
 /// Deposits that lie together. Larger blocks are less full, smaller ones need more of them.
 const BLOCK: usize = 64;
@@ -46,10 +47,12 @@ impl Deposits {
     pub fn add<L: Lanes>(&mut self, line: &Line, slices: &Slices) {
         let (edge, last) = (L::splat(self.side - 0.5), L::splat(Slices::END));
         let count = line.count();
+        let stride = [1.0, self.side];
+        let (along, across) = (L::splat(stride[line.axis()]), L::splat(stride[1 - line.axis()]));
         let (mut word, mut row) = ([0u32; LANES], [0u32; LANES]);
         for k in (0..count).step_by(LANES) {
             let part: Parts<L> = line.parts(k, edge, last);
-            deposits(part.depth, part.y * L::splat(self.side) + part.x, &mut word);
+            deposits(part.depth, part.along * along + part.across * across, &mut word);
             part.row.whole().store(&mut row);
             if self.block.len() < self.next.len() + LANES {
                 self.block.resize(2 * self.block.len() + LANES, [0; BLOCK]);
@@ -65,6 +68,11 @@ impl Deposits {
         }
     }
 
+    /// The number of a plane; what stands for one that is not there is the one next to it.
+    fn plane(&self, plane: isize) -> usize {
+        plane.clamp(0, self.end.len() as isize - 1) as usize
+    }
+
     /// Adds what lies in a level to the texels of a map.
     #[inline(always)]
     pub fn spread(&self, level: usize, map: &mut [f32]) {
@@ -73,6 +81,8 @@ impl Deposits {
         loop {
             let last = block == end / BLOCK;
             let count = if last { end % BLOCK } else { BLOCK };
+            let next = self.block.get(self.next[block] as usize);
+            (0..BLOCK).step_by(16).for_each(|i| fetch(next.map(|n| &n[i])));
             for word in &self.block[block][..count] {
                 map[place_of(*word)] += depth_of(*word);
             }
@@ -94,63 +104,50 @@ fn link(next: &mut Vec<u32>, full: usize) -> u32 {
     new * BLOCK as u32
 }
 
-/// Optical depth before some planes that follow each other, row by row of texels.
+/// Optical depth before two or four planes that follow each other, row by row of texels.
 pub(crate) struct Planes {
-    map: [Vec<f32>; 4],
-    /// Number of the second of the four.
-    plane: usize,
-    /// How many planes after that one are kept.
-    ahead: usize,
-    count: usize,
+    map: Vec<Vec<f32>>,
+    /// Number of the first: -1 at first where there are four.
+    first: isize,
 }
 
 impl Planes {
-    pub fn new() -> Planes {
-        Planes { map: [const { Vec::new() }; 4], plane: 0, ahead: 1, count: 0 }
+    pub fn new(interpolation: Interpolation) -> Planes {
+        let maps = if interpolation == Interpolation::Cubic { 4 } else { 2 };
+        Planes { map: vec![Vec::new(); maps], first: 0 }
     }
 
-    /// Memory of a tile.
-    pub fn bytes(side: usize) -> usize {
-        16 * (side * side + SPARE)
+    /// Memory for a tile.
+    pub fn bytes(&self) -> usize {
+        self.map.iter().map(|m| 4 * m.len()).sum()
     }
 
-    /// Begins a tile at plane 0; one or two planes are kept `ahead`.
-    pub fn begin(&mut self, deposits: &Deposits, side: usize, ahead: usize, count: usize) {
-        for map in &mut self.map {
+    /// Begins a tile: a point lies between planes 0 and 1.
+    pub fn begin(&mut self, deposits: &Deposits, side: usize) {
+        self.first = if self.map.len() == 4 { -1 } else { 0 };
+        for (plane, map) in (self.first..).zip(&mut self.map) {
             map.clear();
             map.resize(side * side + SPARE, 0.0);
-        }
-        (self.plane, self.ahead, self.count) = (0, ahead, count);
-        deposits.spread(0, &mut self.map[1]);
-        let [first, now, rest @ ..] = &mut self.map;
-        first.copy_from_slice(now);
-        let mut before = &*now;
-        for (k, map) in rest[..ahead].iter_mut().enumerate() {
-            map.copy_from_slice(before);
-            if k < count {
-                deposits.spread(k + 1, map);
-            }
-            before = map;
+            (0..=deposits.plane(plane)).for_each(|level| deposits.spread(level, map));
         }
     }
 
-    /// Goes on to plane `plane`.
+    /// Goes on to points between `plane` and the next.
     pub fn go(&mut self, deposits: &Deposits, plane: usize) {
-        while self.plane < plane {
-            self.plane += 1;
-            self.map[..2 + self.ahead].rotate_left(1);
-            let [.., before, last] = &mut self.map[..2 + self.ahead] else { return };
-            last.copy_from_slice(before);
-            let level = self.plane + self.ahead;
-            // What stands for a plane that is not there is the one next to it.
-            if level <= self.count {
-                deposits.spread(level, last);
-            }
+        let maps = self.map.len() as isize;
+        let first = plane as isize - (maps / 2 - 1);
+        while self.first < first {
+            // The first becomes the last. What lies between is added to it again: a copy of the plane before costs more.
+            let levels = deposits.plane(self.first) + 1..=deposits.plane(self.first + maps);
+            self.map.rotate_left(1);
+            let last = &mut self.map[maps as usize - 1];
+            levels.for_each(|level| deposits.spread(level, last));
+            self.first += 1;
         }
     }
 
-    /// The plane before the present one, that one, and two after it.
-    pub fn maps(&self) -> [&[f32]; 4] {
-        self.map.each_ref().map(|m| &m[..])
+    /// The maps, the first plane first.
+    pub fn maps(&self) -> &[Vec<f32>] {
+        &self.map
     }
 }

@@ -2,7 +2,6 @@
 
 use super::exp::exp_neg;
 use super::line::{Line, Parts};
-use super::numbers::{least, most};
 use super::slices::Slices;
 use pelage_geom::registers::{Bits, LANES, Lanes};
 use wide::f32x4;
@@ -12,6 +11,9 @@ const TAPS: usize = 17;
 
 /// Length of a row of taps; more than a footprint is wide, so that what lies to the left of a row lies behind another.
 const ROW: usize = 2 * LANES;
+
+/// From one tap to the next along x and y.
+const STRIDE: [f32; 2] = [1.0, ROW as f32];
 
 /// What is read behind the end of a map.
 pub(crate) const SPARE: usize = 4 * ROW;
@@ -88,11 +90,12 @@ impl Taps {
     }
 }
 
-/// Planes around a point: four maps, rows of `side` texels, the point between the second and the third at the fraction `f`.
+/// Planes around a point: two maps, or four for the cubic, rows of `side` texels, the point between the middle two at the
+/// fraction `f`.
 pub(crate) struct Around<'a> {
-    pub map: [&'a [f32]; 4],
+    pub map: &'a [Vec<f32>],
     pub side: usize,
-    /// Number of the second.
+    /// Number of the one before the point.
     pub plane: usize,
     pub f: f32,
     pub slices: &'a Slices,
@@ -105,8 +108,7 @@ impl Around<'_> {
     /// and 0.027 in fur.
     #[inline(always)]
     pub fn light<L: Lanes, const PLANES: usize>(&self, window: &Window, own: &Own, taps: &mut Taps) -> f32 {
-        let lowest = self.read::<L, PLANES>(window, taps);
-        if PLANES == 1 && lowest > own.dark {
+        if self.read::<L, PLANES>(window, own.dark, taps) {
             return 0.0;
         }
         self.take::<L, PLANES>(window, own.lines, taps);
@@ -134,37 +136,32 @@ impl Around<'_> {
         total(each).clamp(0.0, 1.0)
     }
 
-    /// Fills the taps; the least of them.
+    /// Fills the taps; true if all that is read of linear optical depth is more than `dark`.
     #[inline(always)]
-    fn read<L: Lanes, const PLANES: usize>(&self, window: &Window, taps: &mut Taps) -> f32 {
+    fn read<L: Lanes, const PLANES: usize>(&self, window: &Window, dark: f32, taps: &mut Taps) -> bool {
         let corner = window.y as usize * self.side + window.x as usize;
-        let f = L::splat(self.f);
-        let mut lowest = [f32::MAX; LANES];
+        let (f, dark) = (L::splat(self.f), L::splat(dark));
+        let mut is_dark = PLANES == 1;
         for x in (0..window.across).step_by(LANES) {
             let mut low = L::splat(f32::MAX);
             for row in 0..window.down {
                 let (from, to) = (corner + row * self.side + x, (row + 1) * ROW + x);
                 if PLANES == 1 {
-                    let (a, b) = (L::read(lanes(self.map[1], from)), L::read(lanes(self.map[2], from)));
+                    let (a, b) = (L::read(lanes(&self.map[0], from)), L::read(lanes(&self.map[1], from)));
                     let v = a + (b - a) * f;
                     low = low.min(v);
                     v.write(lanes_mut(&mut taps.0[0], to));
                 } else {
-                    let first = if PLANES == 2 { 1 } else { 0 };
-                    for (taps, map) in taps.0[..PLANES].iter_mut().zip(&self.map[first..]) {
+                    for (taps, map) in taps.0[..PLANES].iter_mut().zip(self.map) {
                         L::read(lanes(map, from)).write(lanes_mut(taps, to));
                     }
                 }
             }
-            if PLANES == 1 {
-                let mut each = [0.0; LANES];
-                low.write(&mut each);
-                for (low, v) in lowest.iter_mut().zip(each).take(window.across - x) {
-                    *low = least(*low, v);
-                }
-            }
+            // What juts out of the row has no weight, and counts as dark.
+            let seen = L::if_gt(L::read(lanes(&window.weight[0], x)), L::splat(0.0), low, dark);
+            is_dark &= !L::any_gt(dark, seen);
         }
-        lowest.into_iter().fold(f32::MAX, least)
+        is_dark
     }
 
     /// Takes the hair's own lines out of the taps.
@@ -175,43 +172,43 @@ impl Around<'_> {
         let high = [low[0] + size[0], low[1] + size[1]];
         let around = f32x4::new([high[0], high[1], -low[0], -low[1]]);
         let (edge, end) = (L::splat(self.side as f32 - 0.5), L::splat(Slices::END));
+        let (zero, one, f) = (L::splat(0.0), L::splat(1.0), L::splat(self.f));
+        let behind = self.behind::<PLANES>();
         // Of what lies behind the planes nothing was put in.
-        let last = self.plane + if PLANES == 4 { 2 } else { 1 };
-        let behind = self.slices.behind(last.min(self.slices.count()));
-        let (mut place, mut row, mut depth) = ([0u32; LANES], [0u32; LANES], [0.0; LANES]);
-        for line in own.iter().filter(|l| !l.misses(around, behind)) {
+        let last = behind[PLANES.max(2) - 1];
+        let next = L::splat(behind[1]);
+        let (mut place, mut depth) = ([0u32; LANES], [[0.0; LANES]; PLANES]);
+        for line in own.iter().filter(|l| !l.misses(around, last)) {
             let parts = line.within(low, high);
+            let (a, b) = (line.axis(), 1 - line.axis());
             for k in parts.clone().step_by(LANES) {
                 let part: Parts<L> = line.parts(k, edge, end);
-                // From one row and column before the window to one behind it.
-                let x = (part.x - L::splat(low[0])).max(L::splat(-1.0)).min(L::splat(size[0]));
-                let y = (part.y - L::splat(low[1])).max(L::splat(-1.0)).min(L::splat(size[1])) + L::splat(1.0);
+                // From one row and column before the window to one behind it; it begins at the second row of the taps.
+                let along = (part.along - L::splat(low[a])).max(L::splat(-1.0)).min(L::splat(size[a]));
+                let across = (part.across - L::splat(low[b])).max(L::splat(-1.0)).min(L::splat(size[b]));
+                let at = along * L::splat(STRIDE[a]) + across * L::splat(STRIDE[b]) + L::splat(STRIDE[1]);
                 // What lies before both the first row and the first column counts nowhere, as the row before the window.
-                (y * L::splat(ROW as f32) + x).max(L::splat(0.0)).whole().store(&mut place);
-                part.row.whole().store(&mut row);
-                part.depth.write(&mut depth);
+                at.max(zero).whole().store(&mut place);
+                for (depth, behind) in depth.iter_mut().zip(behind) {
+                    // All of what lies before the plane; of linear optical depth f of what lies between it and the next.
+                    let beyond = if PLANES == 1 { L::if_gt(next, part.row, f, zero) } else { zero };
+                    (part.depth * L::if_gt(L::splat(behind), part.row, one, beyond)).write(depth);
+                }
                 for i in 0..(parts.end - k).min(LANES) {
-                    let level = self.slices.level(row[i]) as f32;
-                    for (p, taps) in taps.0[..PLANES].iter_mut().enumerate() {
-                        taps[place[i] as usize] -= depth[i] * self.share::<PLANES>(level, p);
+                    for (depth, taps) in depth.iter().zip(&mut taps.0) {
+                        taps[place[i] as usize] -= depth[i];
                     }
                 }
             }
         }
     }
 
-    /// Share of a deposit in a level that counts at one of the planes that are kept apart.
+    /// The first row behind each of the planes that are read.
     #[inline(always)]
-    fn share<const PLANES: usize>(&self, level: f32, p: usize) -> f32 {
-        let plane = self.plane as f32;
-        let seen = match PLANES {
-            // All of what lies before the plane, f of what lies between it and the next.
-            1 => plane + self.f,
-            2 => plane + p as f32,
-            // What stands for a plane that is not there is the one next to it.
-            _ => least(most(plane + p as f32 - 1.0, 0.0), self.slices.count() as f32),
-        };
-        least(most(seen + 1.0 - level, 0.0), 1.0)
+    fn behind<const PLANES: usize>(&self) -> [f32; 4] {
+        let first = if PLANES == 4 { 1 } else { 0 };
+        // What stands for a plane that is not there is the one next to it.
+        std::array::from_fn(|p| self.slices.behind((self.plane + p).saturating_sub(first).min(self.slices.count())))
     }
 }
 

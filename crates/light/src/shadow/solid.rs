@@ -61,7 +61,7 @@ pub(crate) struct Cover {
     side: usize,
     /// Cells per texel.
     scale: f32,
-    /// Least depth of what lies over a cell.
+    /// Least depth of what lies over a cell; empty without solids.
     near: Vec<f32>,
 }
 
@@ -70,7 +70,8 @@ impl Cover {
         let texels = projection.texels as f32;
         let scale = 1.0 / CELL.max(texels / CELLS);
         let side = (texels * scale) as usize + 1;
-        let mut cover = Cover { side, scale, near: vec![f32::INFINITY; side * side] };
+        let near = if solids.is_empty() { Vec::new() } else { vec![f32::INFINITY; side * side] };
+        let mut cover = Cover { side, scale, near };
         let on = 2.0 * ON * projection.size;
         for solid in solids {
             for triangle in solid.triangle {
@@ -112,6 +113,6 @@ impl Cover {
     #[inline]
     pub fn is_clear(&self, at: [f32; 3]) -> bool {
         let cell = |v: f32| ((v * self.scale) as usize).min(self.side - 1);
-        at[2] < self.near[cell(at[1]) * self.side + cell(at[0])]
+        self.near.is_empty() || at[2] < self.near[cell(at[1]) * self.side + cell(at[0])]
     }
 }

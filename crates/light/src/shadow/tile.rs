@@ -121,7 +121,7 @@ impl<'a> Work<'a> {
             side: TILE + 2 * projection.border(),
             slices: Slices::new(settings.slices),
             deposits: Deposits::new(),
-            planes: Planes::new(),
+            planes: Planes::new(settings.interpolation),
             segment: Vec::new(),
             receiver: Vec::new(),
             line: Vec::new(),
@@ -155,7 +155,7 @@ impl<'a> Work<'a> {
         let lists = size_of::<Cast>() * self.segment.len()
             + (size_of::<Receiver>() + 4) * self.receiver.len()
             + size_of::<Line>() * self.line.len();
-        lists + self.deposits.bytes() + Planes::bytes(self.side)
+        lists + self.deposits.bytes() + self.planes.bytes()
     }
 
     /// Spreads all segments, keeps the lines of strands that have points here, and sorts the points by planes.
@@ -230,7 +230,7 @@ impl<'a> Work<'a> {
     #[inline(always)]
     fn receive<L: Lanes, const PLANES: usize>(&mut self, layers: &[ShadowHair], cells: &[Vec<AtomicU32>]) -> usize {
         let mut hidden = 0;
-        self.planes.begin(&self.deposits, self.side, if PLANES == 4 { 2 } else { 1 }, self.slices.count());
+        self.planes.begin(&self.deposits, self.side);
         for k in 0..self.slices.count() {
             let range = self.start[k] as usize..self.start[k + 1] as usize;
             if range.is_empty() {

@@ -98,9 +98,9 @@ pub(super) mod version {
     pub const LOOK: u32 = 2;
     pub const COLLISION: u32 = 3;
     pub const AREAS: u32 = 1;
-    pub const SHADOW: u32 = 2;
+    pub const SHADOW: u32 = 3;
     pub const EXPORT: u32 = 1;
-    pub const PREVIEW: u32 = 3;
+    pub const PREVIEW: u32 = 4;
 }
 
 /// Candidates are made for the next power of two of the density, hairs per square centimetre, so that tweaking a
