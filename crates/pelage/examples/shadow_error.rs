@@ -85,6 +85,25 @@ fn main() {
     ] {
         println!("{name:8} {}", measure(&settings).line());
     }
+    // Other lights, and hair that lets light through, at the default.
+    let middle = Vec3::from_fn(|i, _| f64::from(0.5 * (bound(i, 1.0) - bound(i, -1.0))));
+    let aside = Vec3::new(0.6, 0.5, 0.7).normalize() * f64::from(size);
+    for (name, source, opacity) in [
+        ("parallel, opacity 0.5", source, 0.5f32),
+        ("parallel, opacity 0.1", source, 0.1),
+        ("point at 1.5 sizes", Source::Point { position: middle + aside * 1.5 }, 1.0),
+        ("point at 0.6 sizes", Source::Point { position: middle + aside * 0.6 }, 1.0),
+        ("point in the middle", Source::Point { position: middle }, 1.0),
+    ] {
+        let opacity: Vec<Vec<f32>> = hair.iter().map(|h| vec![opacity; h.offsets.len()]).collect();
+        let hair: Vec<ShadowHair<'_>> =
+            hair.iter().zip(&opacity).map(|(h, opacity)| ShadowHair { opacity, ..*h }).collect();
+        let footprint = Footprint { side, rays: RAYS, seed: 1 };
+        let truth = transmittance_exact(source, &hair, &[], &footprint, &picked).expect("a light");
+        let (found, _) = transmittance(source, &hair, &[], &default).expect("a light");
+        let ShadowError { rms, p95, bias } = ShadowError::of(&found, &picked, &truth);
+        println!("{name}: RMS {rms:.4}  95 % {p95:.4}  bias {bias:+.4}");
+    }
 }
 
 /// What settings cost and give.
