@@ -94,6 +94,8 @@ pub struct RenderCounts {
     pub hairs: usize,
     /// Lines drawn for them: only what is in the picture.
     pub pieces: usize,
+    /// Pixels that those lines were blended into, counted for each line.
+    pub pixels: usize,
     /// Points of strands left out because they are not finite; the hair is cut there.
     pub bad_points: usize,
     /// Triangles left out because a corner is missing or not finite.
@@ -350,7 +352,7 @@ pub fn render_region(
     let lines = lines(scene, &draw, &mut counts);
     let filter = Filter::new();
     let tiles: Vec<usize> = (0..tiling.count()).filter(|t| tiling.is_drawn(*t)).collect();
-    let drawn: Vec<Vec<[f32; 3]>> = tiles
+    let (drawn, blended): (Vec<Vec<[f32; 3]>>, Vec<usize>) = tiles
         .into_par_iter()
         // Some tiles cost many times as much as others.
         .with_max_len(1)
@@ -362,11 +364,13 @@ pub fn render_region(
             }
             let (order, points, opacity) = (&lines.of(t)[..], &lines.points[..], &lines.opacity[..]);
             registers::run(Strokes { tile: &mut tile, order, points, opacity, view: &view, filter: &filter });
-            tile.resolve(scene.background, |triangle, at, depth| {
+            let drawn = tile.resolve(scene.background, |triangle, at, depth| {
                 skin_color(scene, &view, &lighting, triangle, at, depth)
-            })
+            });
+            (drawn, tile.blended)
         })
-        .collect();
+        .unzip();
+    counts.pixels = blended.iter().sum();
     (assemble(&drawn, &tiling, &region), counts)
 }
 

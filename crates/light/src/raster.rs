@@ -96,6 +96,8 @@ pub(crate) struct Tile {
     open: [u64; TILE],
     /// Number of those bits.
     left: usize,
+    /// Pixels that pieces of hairs were blended into, counted for each piece.
+    pub blended: usize,
     /// Triangle seen at each sample; empty as long as there is none.
     triangle: Vec<[u32; SAMPLES]>,
 }
@@ -114,6 +116,7 @@ impl Tile {
             depth: vec![[f32::INFINITY; SAMPLES]; width * height],
             open: [ones(width); TILE],
             left: width * height,
+            blended: 0,
             triangle: Vec::new(),
         }
     }

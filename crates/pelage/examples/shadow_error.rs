@@ -161,7 +161,7 @@ fn sweep(name: &str, measure: &dyn Fn(&ShadowSettings) -> Found) {
     for factor in [0.5, 0.75, 1.25, 1.5] {
         add(format!("filter x {factor}"), vec![ShadowSettings { filter: default.filter * factor, ..default }], false);
     }
-    let title = "Shadow maps: error against time, 16 to 256 slices";
+    let title = "Shadow maps: error against time, 16 to 384 slices";
     let axes = ["seconds on two threads", "RMS error of transmittance"];
     let svg = plot::Plot { title, axes, log: [true, true], series: lines }.svg();
     std::fs::write(format!("{name}.svg"), svg).expect("a file");

@@ -221,6 +221,7 @@ impl Tile {
                 self.left -= 1;
             }
         }
+        self.blended += batch.count;
         batch.count = 0;
     }
 }

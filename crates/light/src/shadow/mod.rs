@@ -103,6 +103,8 @@ pub struct ShadowCounts {
     pub tiles: [usize; 2],
     /// Segments over all tiles: at least `segments` where all are in use, more as they cross tiles.
     pub pairs: usize,
+    /// What they leave in texels, by texel and slice.
+    pub deposits: usize,
     /// Points that solids hide from the light.
     pub behind_solid: usize,
     /// Most memory held at once apart from input and result, bytes, for one thread.
@@ -188,6 +190,7 @@ fn face(
         })
         .reduce(tile::Done::default, tile::Done::and);
     counts.behind_solid += done.hidden;
+    counts.deposits += done.deposits;
     counts.texels = projection.texels;
     counts.tiles[0] += done.tiles;
     counts.tiles[1] += grid * grid;

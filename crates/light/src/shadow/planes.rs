@@ -37,6 +37,13 @@ impl Deposits {
         }
     }
 
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        // All blocks are full but the last of each level.
+        let levels = self.end.len();
+        self.end.iter().map(|end| *end as usize % BLOCK).sum::<usize>() + BLOCK * (self.next.len() - levels)
+    }
+
     /// Memory in use.
     pub fn bytes(&self) -> usize {
         4 * (BLOCK + 1) * self.next.len() + 4 * self.end.len()

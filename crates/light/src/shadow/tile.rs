@@ -77,6 +77,8 @@ pub(crate) struct Done {
     pub tiles: usize,
     /// Points behind solids.
     pub hidden: usize,
+    /// What hairs leave in its texels.
+    pub deposits: usize,
     /// Memory of the tile.
     pub bytes: usize,
 }
@@ -85,7 +87,8 @@ impl Done {
     /// Of two parts of the work.
     pub fn and(self, o: Done) -> Done {
         let bytes = self.bytes.max(o.bytes);
-        Done { tiles: self.tiles + o.tiles, hidden: self.hidden + o.hidden, bytes }
+        let (tiles, hidden) = (self.tiles + o.tiles, self.hidden + o.hidden);
+        Done { tiles, hidden, deposits: self.deposits + o.deposits, bytes }
     }
 }
 
@@ -147,7 +150,7 @@ impl<'a> Work<'a> {
         self.slices.place(from, to, self.settings.placement, middles);
         self.deposits.clear(self.side, self.settings.slices);
         let hidden = run_at(self.width, Spread(self, layers, cells));
-        Done { tiles: 1, hidden, bytes: self.bytes() }
+        Done { tiles: 1, hidden, deposits: self.deposits.count(), bytes: self.bytes() }
     }
 
     /// Memory in use.
