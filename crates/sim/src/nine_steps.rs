@@ -81,6 +81,10 @@ pub fn advance<A: Around>(g: &mut Group, around: &A, span: &Span<'_>, lanes: [bo
             done.strain[l] = (long / all - 1.0).abs();
             // Blown up, if still in numbers.
             done.failed[l] = done.strain[l] > BLOWN_UP;
+            if done.failed[l] {
+                // It is put back to where it was: what is left has no such strain.
+                done.strain[l] = 0.0;
+            }
         }
     }
 }

@@ -9,10 +9,13 @@ use crate::settings::{End, Settings};
 use crate::simulation::{Root, SHORTEST, Span};
 use crate::stage::{self, Air, Contact};
 use crate::wind::Surface;
-use crate::{Motion, Part, Rigid, Shape, Vec3, Wind};
+use crate::{Motion, Part, Rigid, Shape, SimError, Vec3, Wind};
 
 /// Points between samples of the wind along a hair. One is exact and costs most of the step; the wind is smooth over many.
 const WIND_STRIDE: usize = 4;
+
+/// Shortest span, seconds. Positions are rounded by 1e-17 m and more: over less than this, that is a speed of its own.
+const SHORTEST_SPAN: f64 = 1e-9;
 
 /// A span as the integrator sees it.
 pub(crate) struct Scene<'a> {
@@ -34,8 +37,45 @@ pub(crate) fn is_calm(span: &Span<'_>) -> bool {
     span.wind.is_none() && a == b && rests(span.motion) && span.body.parts.iter().all(part)
 }
 
+/// Refuses numbers that are none.
+pub(crate) fn finite(name: &'static str, values: &[f64]) -> Result<(), SimError> {
+    let bad = values.iter().find(|x| !x.is_finite());
+    bad.map_or(Ok(()), |&value| Err(SimError::Setting { name, value, expected: "must be a finite number" }))
+}
+
+/// Refuses a span whose length, gravity, wind or motions are not numbers. Roots that are none hold their own hair only, see
+/// [`Scene::root`].
+pub(crate) fn check(span: &Span<'_>) -> Result<(), SimError> {
+    if !(span.seconds.is_finite() && span.seconds >= SHORTEST_SPAN) {
+        let expected = "a span must last 1e-9 s or longer";
+        return Err(SimError::Setting { name: "seconds", value: span.seconds, expected });
+    }
+    finite("time", &[span.time])?;
+    finite("gravity", &span.gravity.concat())?;
+    let placed = |name, motion: Motion<'_>| {
+        [0.0, 0.5, 1.0].map(motion).iter().try_for_each(|r| finite(name, &[&r.rotation[..], &r.translation].concat()))
+    };
+    placed("motion", span.motion)?;
+    span.body.parts.iter().try_for_each(|p| placed("body.motion", p.motion))?;
+    for w in span.wind.into_iter().flatten() {
+        finite("wind.velocity", &w.velocity)?;
+        finite("wind.drift", &w.drift.unwrap_or_default())?;
+        finite("wind.gust", &[w.gust])?;
+        finite("wind.turbulence", &[w.turbulence])?;
+        finite("wind.boundary", &[w.boundary])?;
+        // Gusts and eddies that never change have endless periods and sizes.
+        let finite_or_endless = |x: f64| if x == f64::INFINITY { 0.0 } else { x };
+        finite("wind.gust_period", &[finite_or_endless(w.gust_period)])?;
+        finite("wind.turbulence_size", &[finite_or_endless(w.turbulence_size)])?;
+        finite("wind.turbulence_period", &[finite_or_endless(w.turbulence_period)])?;
+    }
+    Ok(())
+}
+
+/// Whether a root says where it is: finite, with a rotation that is one.
 fn is_finite(r: &Root) -> bool {
-    r.position.iter().chain(&r.rotation).all(|x| x.is_finite())
+    let norm: f64 = r.rotation.iter().map(|x| x * x).sum();
+    r.position.iter().all(|x| x.is_finite()) && norm.is_normal()
 }
 
 impl Scene<'_> {

@@ -6,7 +6,7 @@ use crate::integrate::{self, Around, Done, Interval, Method, Work};
 use crate::lanes::{LANES, Pack};
 use crate::nine_steps;
 use crate::rod::{self, Damping};
-use crate::scene::{Scene, is_calm};
+use crate::scene::{self, Scene, is_calm};
 use crate::settings::{Model, Settings};
 use crate::settle;
 use crate::stage;
@@ -189,6 +189,7 @@ impl Simulation {
     /// The result depends on the arguments only.
     pub fn new(hairs: &Hairs<'_>, settings: &Settings, gravity: [f64; 3]) -> Result<(Self, Started), SimError> {
         settings.check()?;
+        scene::finite("gravity", &gravity)?;
         let mut counts = Vec::new();
         let (mut pick, mut strands, mut rider) = (Vec::new(), Vec::new(), Vec::new());
         let mut root = Vec::new();
@@ -253,13 +254,15 @@ impl Simulation {
         (hairs.div_ceil(LANES) * (points + 1) * NODE_BYTES + hairs * points * 28) as u64
     }
 
-    /// Moves through a span. `progress` is told the fraction done and may stop the work by returning false; then the
+    /// Moves through a span. A span with gravity, wind, motion or length that is not a number is refused by that name, and
+    /// changes nothing. `progress` is told the fraction done and may stop the work by returning false; then the
     /// state is of no use until [`Simulation::restore`].
     pub fn advance(
         &mut self,
         span: &Span<'_>,
         progress: &(dyn Fn(f64) -> bool + Sync),
     ) -> Result<SpanReport, SimError> {
+        scene::check(span)?;
         let steps = self.steps(span);
         let method = Method {
             width: self.settings.width(),

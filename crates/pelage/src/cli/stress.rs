@@ -36,10 +36,10 @@ pub fn run(a: &StressArguments) -> Result<bool, Error> {
         return Ok(true);
     }
     let mut progress = Progress::new(a.quiet);
-    progress.begin("stress", 2 * cases.len());
+    progress.begin("stress", cases.iter().map(|c| c.models.len()).sum());
     let mut found = Vec::new();
     for case in cases {
-        for model in [Model::Rod, Model::Springs] {
+        for &model in case.models {
             progress.working(&format!("{} ({})", case.name, name(model)));
             found.push((case, model, case.measure(model)));
             progress.step();

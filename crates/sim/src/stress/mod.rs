@@ -4,6 +4,8 @@
 //! on one thread and on several, and must give the same bytes.
 
 mod cases;
+mod inputs;
+mod paper;
 mod rig;
 
 pub use cases::CASES;
@@ -17,6 +19,8 @@ pub struct Case {
     pub name: &'static str,
     /// What is done.
     pub about: &'static str,
+    /// The models it is for.
+    pub models: &'static [Model],
     run: fn(Model, &mut Measures) -> Result<(), SimError>,
 }
 

@@ -124,6 +124,11 @@ impl Rig {
 
     /// What holds always: numbers, and hair no longer than it is.
     pub fn check(&self, m: &mut Measures) {
+        self.bounded(m, 1.02, 0.01 + 1e-12);
+    }
+
+    /// Numbers, no point farther from its root than `reach` hair lengths, and no more strain than given.
+    pub fn bounded(&self, m: &mut Measures, most: f64, strain: f64) {
         let mut strange = self.sim.velocities().iter().flatten().filter(|v| !v.is_finite()).count();
         let mut reach = 0.0f64;
         for (h, natural) in self.hairs.iter().enumerate() {
@@ -133,8 +138,8 @@ impl Rig {
             reach = reach.max((far - 1e-9) / all.max(f64::MIN_POSITIVE));
         }
         m.most("points that are no numbers", strange as f64, 0.0);
-        m.most("farthest point from its root, hair lengths", reach, 1.02);
-        m.most("strain after limiting", self.last.largest_strain, 0.01 + 1e-12);
+        m.most("farthest point from its root, hair lengths", reach, most);
+        m.most("strain after limiting", self.last.largest_strain, strain);
     }
 
     /// What holds where nothing is so bad that a strand had to be given up.
