@@ -321,7 +321,7 @@ mod tests {
             }
             // Another hair in between, which takes nothing, makes pixels forget that a piece of the same was there.
             let other = |k: usize| Point { strand: 1, ..points[k] };
-            let list = vec![points.clone(), vec![other(0), other(2), other(4), other(5)]];
+            let list = [points.clone(), vec![other(0), other(2), other(4), other(5)]];
             let mut tile = Tile::new(0, 0, 64, 64);
             for piece in 0..5 {
                 let strokes = [[0, 0, piece], [0, 1, 0], [0, 1, 1], [0, 1, 2]];
