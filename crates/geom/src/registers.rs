@@ -17,6 +17,9 @@ use std::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Sub};
 /// Numbers that are handled together.
 pub const LANES: usize = 16;
 
+/// 0, 1, 2 and so on.
+pub const COUNT: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
+
 /// Sixteen numbers as they lie in memory, where a register can be loaded from at once.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C, align(64))]
@@ -259,7 +262,7 @@ pub trait Kernel {
 pub enum Width {
     /// 512 bits: AVX-512.
     W512,
-    /// 256 bits: AVX2.
+    /// 256 bits: AVX2 and FMA, which came together.
     W256,
     /// One lane after another.
     Plain,
@@ -274,15 +277,20 @@ impl Width {
         #[cfg(target_arch = "x86_64")]
         match self {
             Width::W512 => return is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq"),
-            Width::W256 => return is_x86_feature_detected!("avx2"),
+            Width::W256 => return is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
             Width::Plain => {}
         }
         self == Width::Plain
     }
 
+    /// Those that this processor has, the widest first.
+    pub fn available() -> impl Iterator<Item = Width> {
+        Width::ALL.into_iter().filter(|w| w.is_here())
+    }
+
     /// The widest that this processor has.
     pub fn widest() -> Width {
-        Width::ALL.into_iter().find(|w| w.is_here()).unwrap_or(Width::Plain)
+        Width::available().next().unwrap_or(Width::Plain)
     }
 }
 

@@ -191,9 +191,7 @@ impl Tile {
         };
         self.pixel.iter().enumerate().map(finish).collect()
     }
-}
 
-impl Tile {
     /// Puts a coverage of colour behind what is in pixel `k`, at the samples whose skin is not nearer than `z`. Coverages
     /// of one strand add up, where those of different strands multiply what is left: pieces of a hair lie side by side, so
     /// a hair looks the same however many pieces it has. Returns what comes through at most.

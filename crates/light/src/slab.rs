@@ -7,7 +7,6 @@ use crate::preview::{Scene, in_layer};
 use crate::skin_map::SkinMap;
 use crate::{V3, View};
 use pelage_geom::Vec3;
-use pelage_geom::registers::fetch;
 use rayon::prelude::*;
 
 /// Cells along each axis of the grid. Fewer lose the parting and the locks; twice as many cost eight times the memory
@@ -21,6 +20,22 @@ const LIFT: f32 = 0.75;
 /// Parts that are summed apart and then together in this order: the same sum for any number of threads.
 const PARTS: usize = 4;
 
+/// Coordinates along axes, if they are usable.
+pub(crate) fn along(axis: [Vec3; 3], p: Vec3) -> Option<[f64; 3]> {
+    let c = axis.map(|a| a.dot(&p));
+    c.iter().all(|v| v.abs() < HUGE).then_some(c)
+}
+
+/// Least and most of coordinates; `None` without any. They are the same in any order.
+pub(crate) fn bounds(points: impl ParallelIterator<Item = [f64; 3]>) -> Option<([f64; 3], [f64; 3])> {
+    let none = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    let join = |(a, b): ([f64; 3], [f64; 3]), (c, d): ([f64; 3], [f64; 3])| {
+        (std::array::from_fn(|i| a[i].min(c[i])), std::array::from_fn(|i| b[i].max(d[i])))
+    };
+    let (lo, hi) = points.fold(|| none, |bounds, c| join(bounds, (c, c))).reduce(|| none, join);
+    (lo[0] <= hi[0]).then_some((lo, hi))
+}
+
 /// Light-aligned box cut into cells: coordinates in cells from a low corner.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Box3 {
@@ -33,20 +48,8 @@ pub(crate) struct Box3 {
 impl Box3 {
     /// Bounds of points along `axis`, cut into `cells` each way; `None` without a finite point.
     pub fn around(axis: [Vec3; 3], cells: usize, points: impl ParallelIterator<Item = Vec3>) -> Option<Box3> {
-        let none = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        let join = |(a, b): ([f64; 3], [f64; 3]), (c, d): ([f64; 3], [f64; 3])| {
-            (std::array::from_fn(|i| a[i].min(c[i])), std::array::from_fn(|i| b[i].max(d[i])))
-        };
-        // Least and most are the same in any order.
-        let (lo, hi) = points
-            .map(|p| axis.map(|a| a.dot(&p)))
-            .filter(|c| c.iter().all(|v| v.abs() < HUGE))
-            .fold(|| none, |bounds, c| join(bounds, (c, c)))
-            .reduce(|| none, join);
+        let (lo, hi) = bounds(points.filter_map(|p| along(axis, p)))?;
         let largest = (0..3).map(|i| hi[i] - lo[i]).fold(f64::NEG_INFINITY, f64::max);
-        if largest < 0.0 {
-            return None;
-        }
         // A flat box would have cells of no size, and so shadows without bound.
         let least = if largest > 0.0 { largest / 16.0 } else { 1.0 };
         let size: [f64; 3] = std::array::from_fn(|i| (hi[i] - lo[i]).max(least) * 1.001);
@@ -147,20 +150,12 @@ fn split(x: f32) -> (usize, f32) {
 fn hair_grid(scene: &Scene, cells: &Box3) -> Vec<f32> {
     let part = |k: usize| {
         let mut grid = vec![0.0f32; CELLS * CELLS * CELLS];
-        // Hairs lie all over the grid: each is added when the next one has been looked at, and its cells are near by.
-        let (mut now, mut next) = (Vec::new(), Vec::new());
         for layer in scene.layers {
             let n = layer.offsets.len();
             for s in n * k / PARTS..n * (k + 1) / PARTS {
-                splat(layer, s, cells, |cell, depth| {
-                    fetch(grid.get(cell));
-                    next.push((cell, depth));
-                });
-                add(&mut grid, &mut now);
-                std::mem::swap(&mut now, &mut next);
+                splat(layer, s, cells, &mut grid);
             }
         }
-        add(&mut grid, &mut now);
         grid
     };
     let parts: Vec<Vec<f32>> = (0..PARTS).into_par_iter().map(part).collect();
@@ -175,15 +170,8 @@ fn hair_grid(scene: &Scene, cells: &Box3) -> Vec<f32> {
     blur(&blur(&sum, 1), CELLS)
 }
 
-/// Adds to cells and empties the list.
-fn add(grid: &mut [f32], cells: &mut Vec<(usize, f32)>) {
-    for (cell, depth) in cells.drain(..) {
-        grid[cell] += depth;
-    }
-}
-
-/// What one strand adds to cells of the grid: its true projected area, spread along it at less than a cell's distance.
-fn splat(layer: &crate::HairView, s: usize, cells: &Box3, mut emit: impl FnMut(usize, f32)) {
+/// Adds one strand to the grid: its true projected area, spread along it at less than a cell's distance.
+fn splat(layer: &crate::HairView, s: usize, cells: &Box3, grid: &mut [f32]) {
     let range = layer.offsets.range(s);
     let opacity = layer.opacity(s);
     // What a cell's side is worth along the one axis, where area counts in cells.
@@ -210,7 +198,7 @@ fn splat(layer: &crate::HairView, s: usize, cells: &Box3, mut emit: impl FnMut(u
             let c: [f32; 3] = std::array::from_fn(|i| a.0[i] + d[i] * f);
             if c.iter().all(|v| *v >= 0.0 && *v < CELLS as f32) {
                 let [x, y, z] = c.map(|v| v as u32 as usize);
-                emit((y * CELLS + x) * CELLS + z, each);
+                grid[(y * CELLS + x) * CELLS + z] += each;
             }
         }
     }

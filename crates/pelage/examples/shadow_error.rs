@@ -53,10 +53,9 @@ fn main() {
         layers.iter().enumerate().flat_map(|(l, h)| (0..h.strands.position.len()).map(move |i| [l, i])).collect();
     let picked: Vec<[usize; 2]> =
         (0..POINTS as u64).map(|k| all[(rng::uniform(3, k, 0, 0) * points as f64) as usize]).collect();
-    let side = ShadowSettings::default().filter;
+    let footprint = Footprint { side: ShadowSettings::default().filter, rays: RAYS, seed: 1 };
     let start = Instant::now();
-    let truth = transmittance_exact(source, &hair, &[], &Footprint { side, rays: RAYS, seed: 1 }, &picked)
-        .expect("a light with a direction");
+    let truth = transmittance_exact(source, &hair, &[], &footprint, &picked).expect("a light with a direction");
     let per_ray = start.elapsed().as_secs_f64() * 1e6 / (POINTS * RAYS) as f64;
     let noise = truth.iter().map(|s| s.variance).sum::<f64>() / POINTS as f64;
     println!("exact: {per_ray:.2} us a ray, noise {:.4}", noise.sqrt());
@@ -98,7 +97,6 @@ fn main() {
         let opacity: Vec<Vec<f32>> = hair.iter().map(|h| vec![opacity; h.offsets.len()]).collect();
         let hair: Vec<ShadowHair<'_>> =
             hair.iter().zip(&opacity).map(|(h, opacity)| ShadowHair { opacity, ..*h }).collect();
-        let footprint = Footprint { side, rays: RAYS, seed: 1 };
         let truth = transmittance_exact(source, &hair, &[], &footprint, &picked).expect("a light");
         let (found, _) = transmittance(source, &hair, &[], &default).expect("a light");
         let ShadowError { rms, p95, bias } = ShadowError::of(&found, &picked, &truth);

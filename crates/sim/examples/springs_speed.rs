@@ -123,7 +123,7 @@ fn shaken(settings: &Settings, shake: f64) -> (f64, f64) {
             p[0] = Pack::splat(p[0].0[0] + move_by);
         }
         let drive = Drive { gravity: [0.0, -9.81, 0.0], target: &target };
-        paper::step(Width::best(), &s.group, &mut state, &mut scratch, settings, &drive, &mut |_, _| false);
+        paper::step(Width::widest(), &s.group, &mut state, &mut scratch, settings, &drive, &mut |_, _| false);
         for i in (4..state.x.len()).step_by(2) {
             let d: f64 = (0..3).map(|c| (state.x[i][c].0[0] - state.x[i - 2][c].0[0]).powi(2)).sum();
             let strain = (d.sqrt() / 4e-3 - 1.0).abs();

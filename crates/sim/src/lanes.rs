@@ -9,6 +9,7 @@
 
 #![allow(unsafe_code)]
 
+pub use pelage_geom::registers::Width;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Strands that are solved together.
@@ -294,61 +295,14 @@ pub trait Kernel {
     fn run<L: Lanes>(self) -> Self::Out;
 }
 
-/// Widest registers to use.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Width {
-    /// 512 bits: AVX-512.
-    W512,
-    /// 256 bits: AVX2 and FMA.
-    W256,
-    /// One lane after another.
-    Plain,
-}
-
-impl Width {
-    /// Every width that this processor has, widest first.
-    pub fn available() -> Vec<Width> {
-        let mut all = Vec::new();
-        #[cfg(target_arch = "x86_64")]
-        {
-            if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
-                all.push(Width::W512);
-            }
-            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-                all.push(Width::W256);
-            }
-        }
-        all.push(Width::Plain);
-        all
-    }
-
-    /// The widest that this processor has.
-    pub fn best() -> Width {
-        Width::available()[0]
-    }
-
-    /// False on an x86 processor without fused multiply-add (before 2013): results would be right, but hundreds of
-    /// times slower.
-    pub fn has_fma() -> bool {
-        #[cfg(target_arch = "x86_64")]
-        return is_x86_feature_detected!("fma");
-        #[cfg(not(target_arch = "x86_64"))]
-        true
-    }
-}
-
 /// Runs a kernel at a width; [`Width::Plain`] where the processor lacks it.
 pub fn run<K: Kernel>(width: Width, kernel: K) -> K::Out {
     #[cfg(target_arch = "x86_64")]
     {
-        // SAFETY: each call is behind the test for exactly the features that the function is compiled for.
+        // SAFETY: each call is behind the test for the features that the function is compiled for; AVX-512 has AVX2 and FMA.
         match width {
-            Width::W512 if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") => {
-                return unsafe { wide::run512(kernel) };
-            }
-            Width::W256 if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") => {
-                return unsafe { wide::run256(kernel) };
-            }
+            Width::W512 if width.is_here() => return unsafe { wide::run512(kernel) },
+            Width::W256 if width.is_here() => return unsafe { wide::run256(kernel) },
             _ if is_x86_feature_detected!("fma") => return unsafe { wide::run_plain(kernel) },
             _ => {}
         }

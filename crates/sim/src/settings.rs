@@ -128,7 +128,7 @@ impl Default for Settings {
 impl Settings {
     /// Registers to use.
     pub fn width(&self) -> Width {
-        if self.wide { Width::best() } else { Width::Plain }
+        if self.wide { Width::widest() } else { Width::Plain }
     }
 
     /// Checks the ranges.

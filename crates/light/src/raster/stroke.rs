@@ -2,7 +2,7 @@
 
 use super::{OPAQUE, Point, Tile, ones};
 use crate::View;
-use pelage_geom::registers::{Bits, Kernel, LANES, Lanes, fetch};
+use pelage_geom::registers::{Bits, COUNT, Kernel, LANES, Lanes, fetch};
 
 /// Standard deviation of the pixel filter. A Gaussian of 0.52 pixels leaves ripples of 1 % at most in the coverage of a
 /// thin line; 0.45 leaves 4 %, which shows as beads and moire, 0.7 is visibly soft.
@@ -111,8 +111,8 @@ impl Kernel for Strokes<'_> {
     }
 }
 
-/// Direction of a hair where two of its pieces meet, at least half as long as a unit vector; zero at its ends and where it
-/// turns back. Neighbours in the list are of one run of the hair unless a border of the picture cut it.
+/// Direction of a hair where two of its pieces meet, of any length; zero at its ends and where it turns by more than
+/// [`SHARP`]. Neighbours in the list are of one run of the hair unless it was cut: by a border of the picture or a bad point.
 #[inline(always)]
 fn joint(a: Option<&Point>, b: &Point, c: Option<&Point>) -> [f32; 2] {
     let (Some(a), Some(c)) = (a, c) else { return [0.0; 2] };
@@ -127,9 +127,6 @@ fn joint(a: Option<&Point>, b: &Point, c: Option<&Point>) -> [f32; 2] {
     let sharp = u[0] * v[0] + u[1] * v[1] < SHARP;
     if sharp { [0.0; 2] } else { [u[0] + v[0], u[1] + v[1]] }
 }
-
-/// 0, 1, 2 and so on.
-const COUNT: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
 
 /// A piece of a hair from `a` to `b` in a tile.
 struct Stroke<'a> {
@@ -309,6 +306,7 @@ mod tests {
     #[test]
     fn pieces_of_a_wide_hair_meet_without_a_gap() {
         let filter = Filter::new();
+        let view = crate::Camera::frame(([-1.0; 3], [1.0; 3]), [0.0, 0.0, -1.0], [0.0, 1.0, 0.0], 1.0).view(64, 64);
         for turn in 0..200 {
             let (a, bend) = (0.031 * f64::from(turn), 0.004 * f64::from(turn % 50));
             let mut at = [32.0 - 20.0 * libm::cos(a), 32.0 - 20.0 * libm::sin(a)];
@@ -325,8 +323,6 @@ mod tests {
             let mut tile = Tile::new(0, 0, 64, 64);
             for piece in 0..5 {
                 let strokes = [[0, 0, piece], [0, 1, 0], [0, 1, 1], [0, 1, 2]];
-                let view =
-                    crate::Camera::frame(([-1.0; 3], [1.0; 3]), [0.0, 0.0, -1.0], [0.0, 1.0, 0.0], 1.0).view(64, 64);
                 let (order, points, opacity) = (&strokes[..], &list[..], &[1.0, 0.0][..]);
                 Strokes { tile: &mut tile, order, points, opacity, view: &view, filter: &filter }.run::<Plain>();
             }

@@ -3,7 +3,7 @@
 use super::bins::Segment;
 use super::numbers::{least, most, short};
 use super::slices::Slices;
-use pelage_geom::registers::{Bits, LANES, Lanes};
+use pelage_geom::registers::{Bits, COUNT, Lanes};
 use wide::f32x4;
 
 /// Widest segment that is drawn as one line, texels: the line has no width, and its depth lands up to half of this beside
@@ -152,9 +152,6 @@ pub(crate) struct Parts<L> {
     pub row: L,
     pub depth: L,
 }
-
-/// 0, 1, 2 and so on.
-const COUNT: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
 
 impl Line {
     /// Lines of a segment in a tile of `side` texels each way. Whatever the width and the place, the deposits add up to the

@@ -4,7 +4,7 @@ use super::line::{Line, Parts};
 use super::numbers::{deposits, depth_of, place_of};
 use super::sample::SPARE;
 use super::settings::Interpolation;
-use super::slices::Slices;
+use super::slices::{Slices, nearest};
 use pelage_geom::registers::{Bits, LANES, Lanes, fetch};
 
 /// Deposits that lie together. Larger blocks are less full, smaller ones need more of them.
@@ -75,9 +75,9 @@ impl Deposits {
         }
     }
 
-    /// The number of a plane; what stands for one that is not there is the one next to it.
-    fn plane(&self, plane: isize) -> usize {
-        plane.clamp(0, self.end.len() as isize - 1) as usize
+    /// The last level before a plane, or the nearest that there is.
+    fn before(&self, plane: isize) -> usize {
+        nearest(plane, self.end.len() - 1)
     }
 
     /// Adds what lies in a level to the texels of a map.
@@ -135,7 +135,7 @@ impl Planes {
         for (plane, map) in (self.first..).zip(&mut self.map) {
             map.clear();
             map.resize(side * side + SPARE, 0.0);
-            (0..=deposits.plane(plane)).for_each(|level| deposits.spread(level, map));
+            (0..=deposits.before(plane)).for_each(|level| deposits.spread(level, map));
         }
     }
 
@@ -145,7 +145,7 @@ impl Planes {
         let first = plane as isize - (maps / 2 - 1);
         while self.first < first {
             // The first becomes the last. What lies between is added to it again: a copy of the plane before costs more.
-            let levels = deposits.plane(self.first) + 1..=deposits.plane(self.first + maps);
+            let levels = deposits.before(self.first) + 1..=deposits.before(self.first + maps);
             self.map.rotate_left(1);
             let last = &mut self.map[maps as usize - 1];
             levels.for_each(|level| deposits.spread(level, last));

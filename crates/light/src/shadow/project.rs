@@ -2,7 +2,7 @@
 
 use super::settings::{ShadowSettings, WIDEST};
 use super::{BadSource, ShadowCounts, ShadowHair, Source};
-use crate::slab::HUGE;
+use crate::slab::{self, HUGE, along};
 use pelage_geom::Vec3;
 use rayon::prelude::*;
 
@@ -228,43 +228,14 @@ impl Projection {
 
 /// Box of the finite points along `axis`, seen from `eye`.
 fn bounds(layers: &[ShadowHair], eye: Vec3, axis: [Vec3; 3], divide: bool) -> Option<([f64; 3], [f64; 3])> {
-    let empty = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    let (lo, hi) = layers
-        .iter()
-        .map(|layer| {
-            // Minimum and maximum are the same in any order.
-            layer
-                .position
-                .par_chunks(1 << 14)
-                .map(|chunk| {
-                    let shift = Vec3::from(layer.origin) - eye;
-                    let (mut lo, mut hi) = empty;
-                    for p in chunk {
-                        let r = shift + Vec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]));
-                        let mut c = [axis[0].dot(&r), axis[1].dot(&r), axis[2].dot(&r)];
-                        if !c.iter().all(|v| v.abs() < HUGE) {
-                            continue;
-                        }
-                        if divide {
-                            c = [c[0] / c[2], c[1] / c[2], c[2]];
-                        }
-                        for i in 0..3 {
-                            lo[i] = lo[i].min(c[i]);
-                            hi[i] = hi[i].max(c[i]);
-                        }
-                    }
-                    (lo, hi)
-                })
-                .reduce(|| empty, join)
-        })
-        .fold(empty, join);
-    (lo[0] <= hi[0]).then_some((lo, hi))
-}
-
-type Box3 = ([f64; 3], [f64; 3]);
-
-fn join(a: Box3, b: Box3) -> Box3 {
-    (std::array::from_fn(|i| a.0[i].min(b.0[i])), std::array::from_fn(|i| a.1[i].max(b.1[i])))
+    let place = |shift: Vec3, p: &[f32; 3]| {
+        let c = along(axis, shift + Vec3::from(p.map(f64::from)))?;
+        Some(if divide { [c[0] / c[2], c[1] / c[2], c[2]] } else { c })
+    };
+    slab::bounds(layers.par_iter().flat_map(|layer| {
+        let shift = Vec3::from(layer.origin) - eye;
+        layer.position.par_iter().filter_map(move |p| place(shift, p))
+    }))
 }
 
 /// Right-handed axes with `z` last.

@@ -3,7 +3,7 @@
 use super::exp::exp_neg;
 use super::line::{Line, Parts};
 use super::slices::Slices;
-use pelage_geom::registers::{Bits, LANES, Lanes};
+use pelage_geom::registers::{Bits, COUNT, LANES, Lanes};
 use wide::f32x4;
 
 /// Texels of the widest footprint along a side.
@@ -29,9 +29,6 @@ pub(crate) struct Window {
     down: usize,
     weight: [[f32; ROW]; 2],
 }
-
-/// 0, 1, 2 and so on.
-const COUNT: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
 
 impl Window {
     pub fn new() -> Window {
@@ -206,9 +203,8 @@ impl Around<'_> {
     /// The first row behind each of the planes that are read.
     #[inline(always)]
     fn behind<const PLANES: usize>(&self) -> [f32; 4] {
-        let first = if PLANES == 4 { 1 } else { 0 };
-        // What stands for a plane that is not there is the one next to it.
-        std::array::from_fn(|p| self.slices.behind((self.plane + p).saturating_sub(first).min(self.slices.count())))
+        let first = self.plane as isize - isize::from(PLANES == 4);
+        std::array::from_fn(|p| self.slices.behind(first + p as isize))
     }
 }
 

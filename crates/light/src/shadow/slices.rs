@@ -17,6 +17,12 @@ const BINS: usize = 256;
 /// one slice.
 const EVEN: f32 = 0.25;
 
+/// The number of a plane before the last one; what stands for one that is not there is the one next to it.
+#[inline(always)]
+pub(crate) fn nearest(plane: isize, last: usize) -> usize {
+    plane.clamp(0, last as isize) as usize
+}
+
 /// Slices between planes of equal depth. Level 0 is what lies before plane 0, level k what lies between planes k - 1 and k,
 /// and the last level what lies behind the last plane, where no point is.
 pub(crate) struct Slices {
@@ -112,10 +118,10 @@ impl Slices {
         level(a).abs_diff(level(b)) as f32
     }
 
-    /// The first row that lies behind a plane.
+    /// The first row that lies behind a plane, or the [`nearest`] that there is.
     #[inline(always)]
-    pub fn behind(&self, plane: usize) -> f32 {
-        f32::from(self.plane[plane]) + 1.0
+    pub fn behind(&self, plane: isize) -> f32 {
+        f32::from(self.plane[nearest(plane, self.count)]) + 1.0
     }
 
     /// The plane before a point of this depth, and how far it is between that and the next.

@@ -174,7 +174,7 @@ fn closed(run: &mut Runner<'_>, name: &str, mesh: &Mesh, topology: &Topology) ->
     let solid = Closed::new(mesh, topology);
     if solid.open_edges > 0 {
         let left = solid.topology.counts.open_edges;
-        warn(run, format!("{name}: {} open edges are closed for collisions, {left} stay open", solid.open_edges));
+        run.warn_once(format!("{name}: {} open edges are closed for collisions, {left} stay open", solid.open_edges));
     }
     solid
 }
@@ -184,14 +184,7 @@ fn note_rays(run: &mut Runner<'_>, name: &str, stand: &Stand) {
         && table.missed > 0
     {
         let all = TABLE[0] * TABLE[1];
-        warn(run, format!("{name}: {} of {all} samples of its radius met no surface and are 0", table.missed));
-    }
-}
-
-/// Once a run, though layers come here one by one.
-fn warn(run: &mut Runner<'_>, text: String) {
-    if !run.warnings.contains(&text) {
-        run.warnings.push(text);
+        run.warn_once(format!("{name}: {} of {all} samples of its radius met no surface and are 0", table.missed));
     }
 }
 

@@ -277,9 +277,7 @@ fn note_coarse_curls(run: &mut Runner<'_>, i: usize, acting: &[Effect], points: 
         let text =
             format!("layer {}: a turn of its curls has {found:.1} segments on the longest hair: {help}", layer.name);
         // At rest and for the frames it is the same.
-        if !run.warnings.contains(&text) {
-            run.warnings.push(text);
-        }
+        run.warn_once(text);
     }
     Ok(())
 }

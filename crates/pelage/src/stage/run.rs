@@ -165,6 +165,13 @@ impl<'a> Runner<'a> {
         })
     }
 
+    /// Warns once a run: layers and frames come one by one.
+    pub(super) fn warn_once(&mut self, text: String) {
+        if !self.warnings.contains(&text) {
+            self.warnings.push(text);
+        }
+    }
+
     /// Payload of a finished step; `None` if it must run.
     pub fn fetch(&self, what: What) -> Option<Entry> {
         if self.is_forced(what) { None } else { self.store.get(&self.plan.step(what).key) }

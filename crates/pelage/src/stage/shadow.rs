@@ -69,12 +69,9 @@ pub fn columns(run: &mut Runner<'_>, l: usize, frame: i32) -> Result<Vec<Vec<f32
         && let Some(finest) = MEASURED.last().filter(|m| m.rms > error)
     {
         let rms = finest.rms;
-        let warning = format!(
+        run.warn_once(format!(
             "shadow.error {error} is finer than any maps: they are wrong by up to {rms}; \"reference\" sends rays"
-        );
-        if !run.warnings.contains(&warning) {
-            run.warnings.push(warning);
-        }
+        ));
     }
     let mut counts = Counts::new();
     let made = match settings(&run.project.shot.value.shadow) {

@@ -238,7 +238,7 @@ fn best(repeats: usize, mut work: impl FnMut()) -> f64 {
 
 /// Compares both solvers on a system.
 fn compare<const D: usize, const ROWS: usize>(name: &str, s: &System<D, ROWS>) {
-    let width = Width::best();
+    let width = Width::widest();
     let n = s.column.len();
     let mut factor = vec![[[Pack::default(); D]; ROWS]; n];
     let mut exact = s.rhs.clone();
@@ -342,7 +342,7 @@ fn rod_system(dt: f64) -> System<4, 11> {
     let n = it.group.node.len();
     let mut scratch = Scratch::default();
     scratch.reserve(n);
-    lanes::run(Width::best(), Run(&it, &mut scratch));
+    lanes::run(Width::widest(), Run(&it, &mut scratch));
     let size = 4 * n;
     let mut s = System { column: vec![[[Pack::default(); 4]; 11]; n], rhs: vec![[Pack::default(); 4]; n + 4] };
     for lane in 0..LANES {

@@ -100,8 +100,8 @@ fn without_collisions_a_step_is_the_implicit_midpoint() {
     let drive = still(&before, -9.81);
     // Untouched, and touched by nothing: the second solve must find the first's answer.
     let mut again = state.clone();
-    step(Width::best(), &group, &mut state, &mut Scratch::default(), &PLAIN, &drive, &mut |_, _| false);
-    step(Width::best(), &group, &mut again, &mut Scratch::default(), &PLAIN, &drive, &mut |_, _| true);
+    step(Width::widest(), &group, &mut state, &mut Scratch::default(), &PLAIN, &drive, &mut |_, _| false);
+    step(Width::widest(), &group, &mut again, &mut Scratch::default(), &PLAIN, &drive, &mut |_, _| true);
     for i in 0..before.x.len() {
         for c in 0..3 {
             for lane in 0..8 {
@@ -129,7 +129,9 @@ fn free_strands_fall_and_keep_their_momentum() {
     let mut s = state.clone();
     for _ in 0..50 {
         let before = s.clone();
-        step(Width::best(), &group, &mut s, &mut Scratch::default(), &PLAIN, &still(&before, -9.81), &mut |_, _| false);
+        step(Width::widest(), &group, &mut s, &mut Scratch::default(), &PLAIN, &still(&before, -9.81), &mut |_, _| {
+            false
+        });
     }
     for lane in 0..8 {
         for c in 0..3 {
@@ -165,7 +167,7 @@ fn limiting_leaves_held_particles_and_no_larger_strain() {
             })
         })
         .collect();
-    let limited = lanes::run(Width::best(), Limit(&group, moved.clone()));
+    let limited = lanes::run(Width::widest(), Limit(&group, moved.clone()));
     for lane in 0..8 {
         for i in 1..limited.len() {
             let free = group.held[i].0[lane] == 0.0;

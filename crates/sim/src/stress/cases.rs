@@ -292,7 +292,7 @@ fn degenerate(model: Model, m: &mut Measures, cases: &[Vec<[f64; 3]>]) -> Done {
             };
             let mut rig = shake(&hairs, m)?;
             let alone = shake(&hairs[..1], m)?;
-            let apart = rig.hair(0).iter().zip(alone.hair(0)).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+            let apart = rig.apart(&alone, 0);
             m.most("what a neighbour notices of it, m", apart, 0.0);
             if length(bad) > 1e-6 && bad.len() <= 100 {
                 rig.calms(m, 24, 0.5)?;

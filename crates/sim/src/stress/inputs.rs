@@ -37,7 +37,7 @@ pub fn root_no_number(model: Model, m: &mut Measures) -> Done {
             rig.check_held(m);
             m.most("bad roots told when all is well", rig.last.bad_roots.len() as f64, 0.0);
             for h in 0..rig.hairs.len() {
-                let apart = rig.hair(h).iter().zip(same.hair(h)).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+                let apart = rig.apart(&same, h);
                 if h == 2 {
                     m.most("way from where it would have been, m", apart, 1e-6);
                 } else {
@@ -218,7 +218,7 @@ fn bad_tip(model: Model, m: &mut Measures, bad: f64) -> Done {
         m.most("hairs with bad tips not told by their id", f64::from(u8::from(rig.last.held != held)), 0.0);
         rig.check(m);
         for h in (0..rig.hairs.len()).filter(|&h| h != 2) {
-            let apart = rig.hair(h).iter().zip(same.hair(h)).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+            let apart = rig.apart(&same, h);
             m.most("what a neighbour notices of it, m", apart, 0.0);
         }
     }

@@ -117,6 +117,11 @@ impl Rig {
         self.sim.positions()[self.sim.offsets().range(h)].iter().map(|p| Vec3::from(*p)).collect()
     }
 
+    /// Largest distance between points of a hair here and of the same one elsewhere, metres.
+    pub fn apart(&self, other: &Rig, h: usize) -> f64 {
+        self.hair(h).iter().zip(other.hair(h)).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+    }
+
     /// Largest speed of a point, metres per second.
     pub fn fastest(&self) -> f64 {
         self.sim.velocities().iter().map(|v| Vec3::from(*v).norm()).fold(0.0, f64::max)
