@@ -6,7 +6,7 @@
 //! tried, and PLOT.csv and PLOT.svg written: error against seconds.
 #![allow(missing_docs, clippy::disallowed_methods)]
 
-#[path = "../../sim/examples/study/plot.rs"]
+#[path = "../src/bench/plot.rs"]
 mod plot;
 
 use pelage::curves;

@@ -1,5 +1,6 @@
 //! Everything that touches a disk or a person: formats, shot and groom files, cache, stages, command line.
 
+pub mod bench;
 pub mod cache;
 pub mod cli;
 pub mod config;

@@ -1,5 +1,6 @@
 //! The command line: arguments, and one function a command. Results go to stdout, talk to stderr.
 
+mod bench;
 mod cache;
 mod compare;
 mod depenetrate;
@@ -71,6 +72,8 @@ pub enum Command {
     },
     /// Push curves out of a skin
     Depenetrate(depenetrate::DepenetrateArguments),
+    /// Measure error against run time, and write a report
+    Bench(bench::BenchArguments),
     /// Do to hair what no shot should, and say what it bore
     Stress(stress::StressArguments),
     /// Look after the cache
@@ -251,6 +254,7 @@ pub fn execute(arguments: Arguments) -> Result<bool, Error> {
         Command::Inspect { file, json } => inspect::inspect(&file, json),
         Command::Compare { a, b, tolerance, json } => compare::compare(&a, &b, tolerance, json),
         Command::Depenetrate(a) => depenetrate::run(&a),
+        Command::Bench(a) => bench::run(&a),
         Command::Stress(a) => stress::run(&a),
         Command::Cache { action } => cache::cache(action),
         Command::Schema { file } => {

@@ -10,6 +10,7 @@ mod closed_form;
 #[path = "../../tests/common/mod.rs"]
 mod common;
 mod pictures;
+#[path = "../../../pelage/src/bench/plot.rs"]
 mod plot;
 mod shot;
 mod solver;

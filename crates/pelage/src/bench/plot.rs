@@ -50,7 +50,7 @@ struct Axis {
 impl Axis {
     fn new(values: impl Iterator<Item = f64>, log: bool) -> Axis {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for v in values.filter(|v| v.is_finite() && (!log || *v > 0.0)) {
+        for v in values {
             (low, high) = (low.min(v), high.max(v));
         }
         if log {
@@ -65,6 +65,7 @@ impl Axis {
             return Axis { log, low: a, high: b, ticks };
         }
         let low = if low > 0.0 { 0.0 } else { low };
+        let high = if high > low { high } else { low + 1.0 };
         let raw = (high - low) / 6.0;
         let ten = libm::pow(10.0, libm::floor(libm::log10(raw)));
         let step = ten * [1.0, 2.0, 5.0, 10.0].into_iter().find(|f| f * ten >= raw).unwrap_or(10.0);
@@ -89,8 +90,18 @@ fn number(v: f64) -> String {
 }
 
 impl Plot<'_> {
-    /// The plot as a file's text.
-    pub fn svg(&self) -> String {
+    /// The plot as a file's text; empty where there is nothing to draw. Points that have no place on the axes are left out.
+    pub fn svg(mut self) -> String {
+        let log = self.log;
+        let placed = |p: &[f64; 2]| (0..2).all(|c| p[c].is_finite() && (!log[c] || p[c] > 0.0));
+        for s in &mut self.series {
+            s.points.retain(placed);
+            s.mark = s.mark.filter(placed);
+        }
+        self.series.retain(|s| !s.points.is_empty());
+        if self.series.iter().all(|s| s.guide) {
+            return String::new();
+        }
         let all = |c: usize| self.series.iter().flat_map(move |s| s.points.iter().chain(&s.mark).map(move |p| p[c]));
         let axis = [Axis::new(all(0), self.log[0]), Axis::new(all(1), self.log[1])];
         let [left, top, right, bottom] = FRAME;
