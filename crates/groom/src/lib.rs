@@ -11,6 +11,7 @@ pub mod control;
 pub mod depenetrate;
 pub mod instance;
 pub mod interpolate;
+pub mod keep;
 pub mod look;
 pub mod parting;
 pub mod place;

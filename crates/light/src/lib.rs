@@ -15,6 +15,7 @@ pub mod shadow;
 mod shorten;
 mod skin_map;
 mod slab;
+pub mod visible;
 
 pub use camera::{Camera, View};
 pub use image::{Image, Tone, contact_sheet};

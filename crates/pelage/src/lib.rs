@@ -10,6 +10,7 @@ pub mod files;
 pub mod format;
 pub mod progress;
 pub mod project;
+pub mod quality;
 pub mod report;
 pub mod sample;
 pub mod stage;

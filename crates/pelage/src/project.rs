@@ -6,6 +6,7 @@ use crate::config::{
     BodyKind, BodyMesh, Document, Emitter, Feature, GroomFile, Key, Keyed, Material, SEGMENTS, ShotFile, Target,
 };
 use crate::format::csv;
+use crate::quality::{self, Resolved};
 use pelage_geom::RigidMotion;
 use pelage_geom::motion::RigidTransform;
 use std::collections::BTreeMap;
@@ -118,6 +119,10 @@ pub struct Project {
     pub motion: Option<SkinMotion>,
     /// Files of particles, one entry an emitter.
     pub particles: Vec<Option<InputFile>>,
+    /// What was chosen for `simulate.quality`; its settings stand in `shot`.
+    pub quality: Option<Resolved>,
+    /// The map of `skip.mask`, as `maps` has it.
+    pub mask: Option<Vec<(u32, InputFile)>>,
     /// Share of each layer's hairs that this is of: 1 for the shot itself.
     pub share: Vec<f64>,
     /// Every map, by the path written in the groom file: UDIM number (0 without tiles) and file.
@@ -127,8 +132,15 @@ pub struct Project {
 impl Project {
     /// Reads both files and finds every input they name.
     pub fn open(shot_file: &Path) -> Result<Self, Error> {
-        let shot: Document<ShotFile> = Document::read(shot_file)?;
+        let mut shot: Document<ShotFile> = Document::read(shot_file)?;
         shot.check()?;
+        let quality =
+            shot.value.simulate.quality.map(|budget| quality::resolved(shot_file, &budget)).transpose()?.flatten();
+        if let Some(Resolved { settings, .. }) = &quality {
+            let s = &mut shot.value.simulate;
+            (s.segments, s.substeps) = (Some(settings.segments), Some(settings.substeps));
+            s.tolerance = Some(settings.tolerance);
+        }
         let folders = [("cache.dir", &shot.value.cache.dir), ("export.dir", &shot.value.export.dir)];
         for (key, folder) in folders.map(|(key, written)| (key, shot.resolve(written))) {
             if folder.exists() && !folder.is_dir() {
@@ -175,9 +187,26 @@ impl Project {
                 place.insert(tiles);
             }
         }
+        let mask = shot.value.skip.mask.as_ref();
+        let mask = mask.map(|m| find.map(&shot, "skip.mask.map", &m.map)).transpose()?;
         hashes.save();
         let share = vec![1.0; groom.value.layer.len()];
-        Ok(Project { shot, groom, share, rest, curves, bodies, drawn, frames, before, motion, particles, maps })
+        Ok(Project {
+            shot,
+            groom,
+            share,
+            rest,
+            curves,
+            bodies,
+            drawn,
+            frames,
+            before,
+            motion,
+            particles,
+            maps,
+            mask,
+            quality,
+        })
     }
 
     /// True for a part of the shot's hairs ([`Project::thinned`]).
@@ -206,7 +235,7 @@ impl Project {
         let skins = skins.filter_map(|at| if let SkinAt::File(file) = at { Some(file) } else { None });
         let motions = self.bodies.iter().map(|b| &b.motion).chain([&self.motion]).flatten().map(|m| &m.file);
         let single = [&self.rest, &self.curves, &self.drawn].into_iter().flatten();
-        let maps = self.maps.values().flatten().map(|(_, file)| file);
+        let maps = self.maps.values().chain(&self.mask).flatten().map(|(_, file)| file);
         let single = single.chain(self.particles.iter().flatten());
         single.chain(skins).chain(self.bodies.iter().map(|b| &b.file)).chain(motions).chain(maps).collect()
     }

@@ -55,6 +55,7 @@ fn measure(count: usize, segments: usize, curve: f64, wide: bool) {
             body: &body,
             gravity: [g, g],
             wind: None,
+            still: &[],
         };
         let start = Instant::now();
         let r = sim.advance(&span, &|_| true).unwrap();

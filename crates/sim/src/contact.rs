@@ -165,11 +165,11 @@ pub fn settle(g: &mut Group, contact: &[Contact], lanes: [bool; LANES]) {
 }
 
 /// At the end of a span: points that the exact mesh has inside come out to its surface, but not those that are still deep
-/// on their way out. Returns how many were moved, and how deep the deepest is that stays.
-pub fn correct(g: &mut Group, body: &Instant<'_, '_>) -> (u64, f64) {
+/// on their way out; strands that sleep are passed over. Returns how many were moved, and how deep the deepest is that stays.
+pub fn correct(g: &mut Group, body: &Instant<'_, '_>, asleep: [bool; LANES]) -> (u64, f64) {
     let (mut moved, mut deepest) = (0, 0.0f64);
     for i in 0..g.node.len() {
-        for l in 0..LANES {
+        for l in (0..LANES).filter(|l| !asleep[*l]) {
             if !is_free(g, i, l) {
                 continue;
             }

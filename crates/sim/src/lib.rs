@@ -14,6 +14,7 @@ mod hinge;
 pub mod integrate;
 pub mod lanes;
 pub mod nine_steps;
+mod place;
 pub mod rod;
 mod scene;
 pub mod settings;
@@ -26,7 +27,7 @@ pub mod wind;
 
 pub use body::{
     Body, Bounds, Closed, Deforming, Ellipsoid, Exact, Field, FieldSettings, Flow, Hit, Instant, Motion, Part, Rigid,
-    RigidFit, Shape, Table, rigid_fit,
+    RigidFit, Shape, Table, rigid_fit, rigid_part,
 };
 pub use settings::{End, Material, Model, Settings};
 pub use simulation::{Hairs, Root, SimError, Simulation, Span, SpanReport, Started, StiffenedStrand};

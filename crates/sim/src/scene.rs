@@ -25,16 +25,34 @@ pub(crate) struct Scene<'a> {
     pub(crate) settings: &'a Settings,
     /// Where every root was at the end of the last span, in the world.
     pub(crate) last: &'a [Rigid],
-    /// Nothing around the hair moves in this span: neither skin, nor body, gravity, or wind.
-    pub(crate) calm: bool,
+    /// What moves around hair in this span.
+    pub(crate) calm: Calm,
 }
 
-/// Whether nothing around the hair moves in a span.
-pub(crate) fn is_calm(span: &Span<'_>) -> bool {
-    let rests = |m: Motion<'_>| m(0.0) == m(0.5) && m(0.0) == m(1.0);
-    let part = |p: &Part<'_>| rests(p.motion) && !matches!(p.shape, Shape::Deforming(_));
-    let [a, b] = span.gravity;
-    span.wind.is_none() && a == b && rests(span.motion) && span.body.parts.iter().all(part)
+/// What moves around hair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Calm {
+    /// Nothing: neither skin, nor body, gravity, or wind.
+    All,
+    /// Skin or body, but not around the hairs that the span calls still.
+    Still,
+    /// Something, around all hair.
+    None,
+}
+
+impl Calm {
+    /// What moves in a span.
+    pub(crate) fn of(span: &Span<'_>) -> Calm {
+        let rests = |m: Motion<'_>| m(0.0) == m(0.5) && m(0.0) == m(1.0);
+        let part = |p: &Part<'_>| rests(p.motion) && !matches!(p.shape, Shape::Deforming(_));
+        let [a, b] = span.gravity;
+        match span.wind.is_none() && a == b {
+            false => Calm::None,
+            true if !span.still.is_empty() => Calm::Still,
+            true if rests(span.motion) && span.body.parts.iter().all(part) => Calm::All,
+            true => Calm::None,
+        }
+    }
 }
 
 /// Refuses numbers that are none.
@@ -79,6 +97,11 @@ fn is_finite(r: &Root) -> bool {
 }
 
 impl Scene<'_> {
+    /// Whether nothing around a hair moves.
+    pub(crate) fn is_calm(&self, s: usize) -> bool {
+        self.calm == Calm::All || (self.calm == Calm::Still && self.span.still[s])
+    }
+
     /// A root or tip in the world at a fraction of the span, where the skin's coordinates are at `world`.
     fn placement(&self, world: &Rigid, ends: [&[Root]; 2], s: usize, fraction: f64) -> Rigid {
         let [a, b] = [&ends[0][s], &ends[1][s]];

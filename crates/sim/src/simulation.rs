@@ -5,8 +5,9 @@ use crate::group::{Group, Strand};
 use crate::integrate::{self, Around, Done, Interval, Method, Work};
 use crate::lanes::{LANES, Pack};
 use crate::nine_steps;
+use crate::place;
 use crate::rod::{self, Damping};
-use crate::scene::{self, Scene, is_calm};
+use crate::scene::{self, Calm, Scene};
 use crate::settings::{Model, Settings};
 use crate::settle;
 use crate::stage;
@@ -54,6 +55,9 @@ pub struct Span<'a> {
     pub gravity: [[f64; 3]; 2],
     /// The wind at the beginning and at the end.
     pub wind: Option<[&'a Wind; 2]>,
+    /// \[hairs\] True for hairs of which the caller knows that in this span nothing moves that they hang on or may touch, up to
+    /// rounding. Empty where that is not known: then all hairs count as still if `motion` and `body` rest.
+    pub still: &'a [bool],
 }
 
 /// A strand that had to be stiffened so that its groomed pose can stand.
@@ -180,6 +184,10 @@ const STEPS_PER_SECOND: f64 = 192.0;
 /// would still have moved is less than this times its longest period (about 1 s): a micrometre.
 const SLEEP_SPEED: f64 = 1e-6;
 
+/// Motion of a root over a span that is rounding, metres and radians: a billionth of a hair's length, which takes an hour of
+/// film to add up to a micrometre.
+const ROUNDING: f64 = 1e-10;
+
 /// Farthest that the skin turns in a step, radians.
 const STEP_TURN: f64 = 0.1;
 
@@ -216,8 +224,16 @@ impl Simulation {
                 strands.push(Strand { index: h, point: own });
             }
         }
-        // Strands of like length share a group, so that little is padded; those that never twist have their own.
-        strands.sort_by_key(|s| (settle::twists(s, settings), s.point.len()));
+        // Strands of like length share a group, so that little is padded; those that never twist have their own. Of these,
+        // neighbours: where hair is at rest in some places whole groups can sleep.
+        let place = place::along_curve(strands.iter().map(|s| s.point[0]));
+        let mut order: Vec<(bool, usize, u64, Strand)> = strands
+            .into_iter()
+            .zip(place)
+            .map(|(s, place)| (settle::twists(&s, settings), s.point.len(), place, s))
+            .collect();
+        order.sort_by_key(|(twists, points, place, _)| (*twists, *points, *place));
+        let strands: Vec<Strand> = order.into_iter().map(|o| o.3).collect();
         let (plain, twisting) = strands.split_at(strands.partition_point(|s| !settle::twists(s, settings)));
         let chunks: Vec<&[Strand]> = plain.chunks(LANES).chain(twisting.chunks(LANES)).collect();
         let prepare = |s: &&[Strand]| settle::prepare(s, settings, gravity);
@@ -274,7 +290,7 @@ impl Simulation {
         };
         let count = self.group.len();
         let (finished, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
-        let scene = Scene { span, settings: &self.settings, last: &self.root, calm: is_calm(span) };
+        let scene = Scene { span, settings: &self.settings, last: &self.root, calm: Calm::of(span) };
         let done: Vec<Moved> = self
             .group
             .par_iter_mut()
@@ -482,7 +498,7 @@ fn move_group(g: &mut Group, scene: &Scene<'_>, method: &Method, steps: u32, wor
             done.teleported[l] = true;
             g.carry(l, &from, &to);
             Keep::carried(g, l, &scene.span.body.at(1.0));
-        } else if scene.calm && scene.settings.sleep && g.quiet[l] >= 2 && from == to {
+        } else if scene.is_calm(s) && scene.settings.sleep && g.quiet[l] >= 2 && stays(&from, &to) {
             done.asleep[l] = true;
         } else {
             lanes[l] = true;
@@ -522,7 +538,7 @@ fn move_group(g: &mut Group, scene: &Scene<'_>, method: &Method, steps: u32, wor
             Keep::carried(g, l, &scene.span.body.at(1.0));
         }
         if lanes[l] {
-            let still = scene.calm && done.done.speed[l] < SLEEP_SPEED;
+            let still = scene.is_calm(s) && done.done.speed[l] < SLEEP_SPEED;
             g.quiet[l] = if still { g.quiet[l] + 1 } else { 0 };
             if g.quiet[l] >= 2 && scene.settings.sleep {
                 g.stop(l);
@@ -530,8 +546,15 @@ fn move_group(g: &mut Group, scene: &Scene<'_>, method: &Method, steps: u32, wor
         }
     }
     if scene.solid() {
-        (done.corrected, done.deepest) = contact::correct(g, &scene.span.body.at(1.0));
+        (done.corrected, done.deepest) = contact::correct(g, &scene.span.body.at(1.0), done.asleep);
     }
+}
+
+/// Whether a root is where it was, up to the rounding of coordinates that move.
+fn stays(from: &Rigid, to: &Rigid) -> bool {
+    let moved = (Vec3::from(to.translation) - Vec3::from(from.translation)).norm();
+    let turned = from.quaternion().angle_to(&to.quaternion());
+    moved <= ROUNDING && turned <= ROUNDING
 }
 
 /// What a group did in a span.

@@ -43,6 +43,7 @@ fn nothing_to_do_and_stopping() {
         body: &EMPTY,
         gravity: [GRAVITY; 2],
         wind: None,
+        still: &[],
     };
     assert!(sim.advance(&span(&[]), &|_| true).is_ok());
     // Stopped, and put back where it was.

@@ -98,8 +98,8 @@ pub fn centres(id: &[StrandId], area: f64, density: &dyn Fn(usize) -> f64, open:
     (0..id.len() as u32).filter(is).collect()
 }
 
-/// Centres in a hashed grid of cubes.
-struct Grid {
+/// Positions in a hashed grid of cubes.
+pub(crate) struct Grid {
     cell: f32,
     mask: u32,
     start: Vec<u32>,
@@ -107,7 +107,7 @@ struct Grid {
 }
 
 impl Grid {
-    fn new(cell: f32, position: impl Iterator<Item = [f32; 3]> + Clone) -> Self {
+    pub(crate) fn new(cell: f32, position: impl Iterator<Item = [f32; 3]> + Clone) -> Self {
         let n = position.clone().count();
         let slots = (2 * n).next_power_of_two().max(2);
         let mut grid = Grid { cell, mask: slots as u32 - 1, start: vec![0; slots + 1], entry: vec![0; n] };
@@ -134,7 +134,7 @@ impl Grid {
     }
 
     /// Entries that may lie in cubes at `ring` steps from the cube of a point.
-    fn ring(&self, p: [f32; 3], ring: i32, mut each: impl FnMut(usize)) {
+    pub(crate) fn ring(&self, p: [f32; 3], ring: i32, mut each: impl FnMut(usize)) {
         let [x, y, z] = self.cube(p);
         for dz in -ring..=ring {
             for dy in -ring..=ring {

@@ -8,6 +8,7 @@ mod machine;
 mod plot;
 mod report;
 mod scaling;
+mod skips;
 
 use crate::Error;
 use crate::progress::Progress;
@@ -28,7 +29,7 @@ pub struct Study {
 }
 
 /// All studies in the order of the report.
-pub const STUDIES: [Study; 1] = [scaling::STUDY];
+pub const STUDIES: [Study; 2] = [skips::STUDY, scaling::STUDY];
 
 /// What a study found.
 #[derive(Debug, Default)]

@@ -4,6 +4,7 @@ use super::{PreviewArguments, print, run, watch};
 use crate::Error;
 use crate::progress::Progress;
 use crate::project::Project;
+use crate::quality;
 use crate::report::Report;
 use crate::stage::preview::{Part, Show, part};
 use crate::stage::{Options, Runner, Stage};
@@ -18,7 +19,7 @@ pub fn preview(a: PreviewArguments) -> Result<bool, Error> {
         return run::pictures(&a);
     }
     run::threads(a.run.jobs)?;
-    let project = Project::open(&a.run.shot)?;
+    let project = quality::open(&a.run.shot, &mut Progress::new(a.run.quiet))?;
     let wanted = wanted(&a, a.hairs.unwrap_or(100.0));
     let name = match (&a.show, a.crop) {
         (Some(column), _) => format!("preview-{column}.png"),

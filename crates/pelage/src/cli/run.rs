@@ -6,6 +6,7 @@ use crate::config::ExportFormat;
 use crate::files::write_whole;
 use crate::progress::Progress;
 use crate::project::Project;
+use crate::quality;
 use crate::report::Report;
 use crate::stage::{Options, Pictures, PlannedStage, Runner, Stage};
 use std::io::Write;
@@ -24,7 +25,7 @@ pub(super) fn threads(jobs: Option<u16>) -> Result<(), Error> {
 /// Brings a shot up to date.
 pub fn run(a: RunArguments) -> Result<bool, Error> {
     threads(a.jobs)?;
-    let project = Project::open(&a.shot)?;
+    let project = quality::open(&a.shot, &mut Progress::new(a.quiet))?;
     let options = options(&a);
     bring(&a, &project, options)
 }
@@ -32,7 +33,7 @@ pub fn run(a: RunArguments) -> Result<bool, Error> {
 /// Makes the still and the contact sheet of a shot, or a sequence, or a turntable, and what they need; no files.
 pub fn pictures(a: &PreviewArguments) -> Result<bool, Error> {
     threads(a.run.jobs)?;
-    let project = Project::open(&a.run.shot)?;
+    let project = quality::open(&a.run.shot, &mut Progress::new(a.run.quiet))?;
     let (still, sheet) = (project.still_frame(), project.sheet_frames());
     let all = options(&a.run);
     let (pictures, frames) = if a.sequence {
@@ -100,6 +101,11 @@ fn summary(report: &Report, project: &Project) -> String {
 /// Says what would run, and why.
 pub fn plan(a: RunArguments) -> Result<bool, Error> {
     let project = Project::open(&a.shot)?;
+    if let Some(budget) = project.shot.value.simulate.quality.filter(|_| project.quality.is_none()) {
+        let text =
+            format!("note: nothing is chosen for simulate.quality = {budget} yet: this is the plan of the defaults");
+        crate::progress::print_line(&text);
+    }
     let mut progress = Progress::new(true);
     let planned = Runner::new(&project, options(&a), &mut progress)?.planned();
     if a.json {

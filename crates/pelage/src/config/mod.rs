@@ -10,6 +10,7 @@ mod look_value;
 mod preview;
 mod shot;
 mod simulate;
+mod skip;
 
 pub use document::{ConfigError, Document};
 pub use groom::{
@@ -27,7 +28,8 @@ pub use look_value::{LookValue, Varied, VariedValue, VaryScale};
 pub use preview::{CameraSettings, Preview, PreviewTone, Shade};
 pub use shot::{CacheSettings, Export, ExportFormat, GroomRef, Look, LookOverride, Shot, ShotFile, Skin, UpAxis};
 pub use simulate::{BodyKind, BodyMesh, BodySettings};
-pub use simulate::{Material, SEGMENTS, Simulate, StrandModel, Target, WindSettings, check_material};
+pub use simulate::{Material, Quality, SEGMENTS, Simulate, StrandModel, Target, WindSettings, check_material};
+pub use skip::Skip;
 
 /// JSON Schema (draft 2020-12) of a shot file or a groom file, for editors.
 pub fn schema<T: schemars::JsonSchema>() -> String {

@@ -6,6 +6,7 @@ use super::light::{Light, Shadow};
 use super::look::Operator;
 use super::preview::Preview;
 use super::simulate::{Simulate, Target};
+use super::skip::Skip;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::path::PathBuf;
@@ -38,6 +39,9 @@ pub struct ShotFile {
     /// Pictures to write.
     #[serde(default)]
     pub preview: Preview,
+    /// Hair that this shot does without.
+    #[serde(default)]
+    pub skip: Skip,
     /// Where finished steps are kept.
     #[serde(default)]
     pub cache: CacheSettings,
@@ -235,6 +239,7 @@ impl Document<ShotFile> {
         }
         self.check_preview()?;
         self.check_lights()?;
+        self.check_skip()?;
         self.check_simulate()
     }
 

@@ -26,6 +26,12 @@ pub struct Simulate {
     pub segments: Option<usize>,
     /// Steps in a frame. Default: chosen from the motion of the skin.
     pub substeps: Option<u32>,
+    /// Change of a segment's direction at which iterations end, radians. Default: 0.00001.
+    pub tolerance: Option<f64>,
+    /// A budget by which `segments`, `substeps` and `tolerance` are chosen instead: `{ error = 0.5 }`, the median distance of
+    /// hairs from a much finer simulation, millimetres, or `{ seconds = 2 }` of simulation a frame. Chosen once, by
+    /// simulating a few hairs, and written beside the shot file. Default: none.
+    pub quality: Option<Quality>,
     /// Start in equilibrium under gravity, so that the hair stands as it was combed; false: its shape is the natural,
     /// unloaded one. Default: true; false for hair from a curves file.
     pub sag_free: Option<bool>,
@@ -59,6 +65,8 @@ impl Default for Simulate {
             model: StrandModel::Rod,
             segments: None,
             substeps: None,
+            tolerance: None,
+            quality: None,
             sag_free: None,
             strain_limit: 0.01,
             friction: 0.3,
@@ -70,6 +78,25 @@ impl Default for Simulate {
             wind: None,
             body: BodySettings::default(),
             material: None,
+        }
+    }
+}
+
+/// A budget of the simulation.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Quality {
+    /// Median distance of hairs from a much finer simulation, millimetres.
+    Error(f64),
+    /// Seconds of simulation a frame, on all threads.
+    Seconds(f64),
+}
+
+impl std::fmt::Display for Quality {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Quality::Error(mm) => write!(f, "{{ error = {mm} }}"),
+            Quality::Seconds(s) => write!(f, "{{ seconds = {s} }}"),
         }
     }
 }
@@ -357,6 +384,8 @@ impl Document<ShotFile> {
         let segments = s.segments.unwrap_or(SEGMENTS);
         number("segments", segments as f64, 1.0, 4095.0, "25 is usual, 50 is fine")?;
         number("substeps", f64::from(s.substeps.unwrap_or(1)), 1.0, 1e6, "leave it out and it is chosen")?;
+        number("tolerance", s.tolerance.unwrap_or(1e-5), 1e-12, 0.1, "0.00001 is usual")?;
+        self.check_quality()?;
         number("strain_limit", s.strain_limit, 1e-6, 1e3, "0.01 is one percent")?;
         number("friction", s.friction, 0.0, 100.0, "0.3 is usual")?;
         number("offset", s.offset, 0.0, 1e3, "it is in millimetres; 0.5 is usual")?;
@@ -379,6 +408,36 @@ impl Document<ShotFile> {
         let period = wind.turbulence_period.unwrap_or(d.turbulence_period);
         number("wind.turbulence_period", period, 1e-6, 1e6, "it is in seconds")?;
         number("wind.boundary", wind.boundary.unwrap_or(d.boundary), 0.0, 1e3, "it is in metres")
+    }
+
+    fn check_quality(&self) -> Result<(), ConfigError> {
+        let s = &self.value.simulate;
+        let Some(quality) = &s.quality else { return Ok(()) };
+        let set = [
+            ("segments", s.segments.is_some()),
+            ("substeps", s.substeps.is_some()),
+            ("tolerance", s.tolerance.is_some()),
+        ];
+        if let Some((key, _)) = set.iter().find(|(_, set)| *set) {
+            let what = "can't go together with simulate.quality, which chooses it";
+            return Err(self.error(&format!("simulate.{key}"), what, "keep one of the two"));
+        }
+        if self.value.groom.curves.is_some() {
+            let what = "is for hair of a groom; this shot takes its hair from a curves file";
+            return Err(self.error("simulate.quality", what, "give segments and substeps"));
+        }
+        let (name, x) = match quality {
+            Quality::Error(x) => ("error", *x),
+            Quality::Seconds(x) => ("seconds", *x),
+        };
+        range(
+            self,
+            &format!("simulate.quality.{name}"),
+            x,
+            1e-6,
+            1e6,
+            "error is in millimetres, seconds are of a frame",
+        )
     }
 
     fn check_body(&self) -> Result<(), ConfigError> {

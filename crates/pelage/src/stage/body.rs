@@ -8,7 +8,7 @@ use crate::format::ply;
 use crate::project::SkinMotion;
 use crate::timeline::Timeline;
 use pelage_geom::{Bvh, Mesh, Topology, Vec3};
-use pelage_sim::body::{Closed, Deforming, Ellipsoid, Exact, Field, FieldSettings, Flow, rigid_fit};
+use pelage_sim::body::{Closed, Deforming, Ellipsoid, Exact, Field, FieldSettings, Flow, rigid_part};
 use pelage_sim::{Body, Bounds, Part, Rigid, Shape, Table};
 use std::rc::Rc;
 
@@ -110,12 +110,13 @@ fn table(surface: &Surface, kind: BodyKind, axis: Option<[Vec3; 2]>, up: UpAxis)
     Table::cylinder(&surface.bvh, from, to, farthest(&across), TABLE)
 }
 
-/// What the shot has of bodies around the hair of a layer, whose roots at rest and longest hair give `region` (metres).
+/// What the shot has of bodies around the hair of a layer, whose roots at rest and longest hair give `region` (metres); `whole` is
+/// that of all hairs, with those that the shot does without.
 pub(super) fn colliders(
     run: &mut Runner<'_>,
     layer: usize,
     deforms: bool,
-    region: Option<Bounds>,
+    [region, whole]: [Option<Bounds>; 2],
 ) -> Result<Rc<Colliders>, Error> {
     if let Some((_, found)) = run.colliders.as_ref().filter(|(of, _)| *of == layer) {
         return Ok(found.clone());
@@ -128,7 +129,7 @@ pub(super) fn colliders(
     if run.project.rest.is_some() && (b.skin || deforms) {
         let skin = groom::skin(run)?;
         let rest = metres(&skin.mesh.position, unit);
-        out.anchor = deforms.then(|| Anchor::new(&rest, region));
+        out.anchor = deforms.then(|| Anchor::new(&rest, whole));
         if b.skin {
             let solid = closed(run, "the skin", &skin.mesh, &skin.topology);
             if deforms {
@@ -207,7 +208,7 @@ impl Colliders {
     pub(super) fn placement(&self, position: Option<&[[f64; 3]]>, unit: f64) -> Rigid {
         let Some((anchor, position)) = self.anchor.as_ref().zip(position) else { return Rigid::default() };
         let now: Vec<[f64; 3]> = anchor.vertex.iter().map(|v| position[*v].map(|x| x * unit)).collect();
-        rigid_fit(&anchor.rest, &now).motion
+        rigid_part(&anchor.rest, &now).motion
     }
 
     /// Between two such placements: the middle of what was fitted goes straight, the rotation along the shorter arc.

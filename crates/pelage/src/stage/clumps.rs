@@ -70,8 +70,7 @@ pub fn clumps(run: &mut Runner<'_>, i: usize, k: usize) -> Result<Rc<Members>, E
 
 fn find(run: &mut Runner<'_>, i: usize, k: usize, what: What) -> Result<Members, Error> {
     let groom = &run.project.groom.value;
-    let (layer, c) = (&groom.layer[i], groom.layer[i].clump[k].clone());
-    let (name, hair_density) = (layer.name.clone(), layer.density.value);
+    let (name, c) = (groom.layer[i].name.clone(), groom.layer[i].clump[k].clone());
     let (roots, at) = (instance::roots(run, i)?, sites(run, i)?);
     let open = match &c.area {
         Some(area) => {
@@ -80,30 +79,18 @@ fn find(run: &mut Runner<'_>, i: usize, k: usize, what: What) -> Result<Members,
         }
         None => Vec::new(),
     };
-    let cm2 = run.project.cm2_per_unit2();
     let hairs = Drawn { id: &roots.id, uv: &roots.uv, position: &at.position, seed: u64::from(layer_seed(&name)) };
-    // Scene units between clumps, as far as the level says: what a size is when none is given covers every gap.
-    let spacing = c.density.as_ref().map(|d| 1.0 / (d.at(0.0).max(1e-9) * cm2).sqrt());
-    let size = c.size.clone().unwrap_or_else(|| {
-        LookValue::constant(match (spacing, &c.regions) {
-            (Some(s), _) => 4.0 * s,
-            (None, Some(_)) => 2.0 / (hair_density.max(1e-9) * cm2).sqrt(),
-            (None, None) => 1.0 / cm2.sqrt(),
-        })
-    });
-    let factor = column(run, &hairs, "size", &size, false)?;
-    let radius = |h: u32| (size.at(0.0) as f32) * factor.get(h as usize).unwrap_or(&1.0);
+    let sizes = sizes(run, i, k, &hairs)?;
     let partings: Vec<Vec<Vec3>> = groom::partings(run);
     let mut sites = Sites { position: &at.position, normal: &at.normal, side: &[] };
-    let most = f64::from((0..roots.id.len() as u32).map(radius).fold(0.0f32, f32::max));
     let origin = groom::skin(run)?.origin();
     let relative: Vec<Vec<Vec3>> =
         partings.iter().map(|l| l.iter().map(|p| p - Vec3::from(origin)).collect()).collect();
-    let side = sides(&relative, most, &sites);
+    let side = sides(&relative, f64::from(sizes.most()), &sites);
     sites.side = &side;
     let before = if joins_clumps(&c, k) { Some(clumps(run, i, k - 1)?) } else { None };
     let found = if c.regions.is_some() {
-        in_regions(run, &c, &roots, &sites, size.at(0.0) as f32, &open)?
+        in_regions(run, &c, &roots, &sites, sizes.value, &open)?
     } else {
         let stands = before.as_ref().map(|b| representatives(b)).unwrap_or_default();
         let may: Vec<bool> = match (open.is_empty(), stands.is_empty()) {
@@ -111,9 +98,9 @@ fn find(run: &mut Runner<'_>, i: usize, k: usize, what: What) -> Result<Members,
             (true, false) => stands,
             (false, false) => open.iter().zip(&stands).map(|(a, b)| *a && *b).collect(),
         };
-        let centre = centre_hairs(run, &c, &hairs, &roots, &may, &format!("layer[{i}].clump[{k}]"))?;
-        let radii: Vec<f32> = centre.iter().map(|h| radius(*h)).collect();
-        let spacing = spacing.map_or(most as f32, |s| s as f32);
+        let centre = centre_hairs(run, i, k, &hairs, &may)?;
+        let radii: Vec<f32> = centre.iter().map(|h| sizes.of(*h as usize)).collect();
+        let spacing = sizes.spacing.unwrap_or_else(|| sizes.most());
         let found = members(&sites, centre, &radii, spacing, &may);
         match &before {
             Some(fine) => whole_clumps(&sites, fine, &radii, found),
@@ -129,20 +116,58 @@ fn find(run: &mut Runner<'_>, i: usize, k: usize, what: What) -> Result<Members,
     Ok(found)
 }
 
-/// Hairs that are centres.
-fn centre_hairs(
+/// How far clumps of a level reach.
+pub(super) struct Sizes {
+    /// Scene units, where nothing varies it.
+    value: f32,
+    /// \[N\] factors of hairs on it; empty: 1.
+    factor: Vec<f32>,
+    /// Scene units between clumps, as far as the level says.
+    spacing: Option<f32>,
+}
+
+impl Sizes {
+    fn of(&self, h: usize) -> f32 {
+        self.value * self.factor.get(h).unwrap_or(&1.0)
+    }
+
+    /// The largest.
+    pub fn most(&self) -> f32 {
+        self.value * if self.factor.is_empty() { 1.0 } else { self.factor.iter().fold(0.0f32, |a, b| a.max(*b)) }
+    }
+}
+
+/// How far clumps of a level reach around each hair, were it a centre. What a size is when none is given covers every gap.
+pub(super) fn sizes(run: &mut Runner<'_>, i: usize, k: usize, hairs: &Drawn<'_>) -> Result<Sizes, Error> {
+    let layer = &run.project.groom.value.layer[i];
+    let c = &layer.clump[k];
+    let cm2 = run.project.cm2_per_unit2();
+    let spacing = c.density.as_ref().map(|d| 1.0 / (d.at(0.0).max(1e-9) * cm2).sqrt());
+    let size = c.size.clone().unwrap_or_else(|| {
+        LookValue::constant(match (spacing, &c.regions) {
+            (Some(s), _) => 4.0 * s,
+            (None, Some(_)) => 2.0 / (layer.density.value.max(1e-9) * cm2).sqrt(),
+            (None, None) => 1.0 / cm2.sqrt(),
+        })
+    });
+    let factor = column(run, hairs, "size", &size, false)?;
+    Ok(Sizes { value: size.at(0.0) as f32, factor, spacing: spacing.map(|s| s as f32) })
+}
+
+/// Hairs that are centres of a level, of those that are `open` (empty: all).
+pub(super) fn centre_hairs(
     run: &mut Runner<'_>,
-    c: &Clump,
+    i: usize,
+    k: usize,
     hairs: &Drawn<'_>,
-    roots: &Roots,
     open: &[bool],
-    at: &str,
 ) -> Result<Vec<u32>, Error> {
+    let c = &run.project.groom.value.layer[i].clump[k];
     let origin = groom::skin(run)?.origin();
     let by_hand = c.roots.iter().flatten().copied().chain(c.curves.iter().flatten().map(|l| l[0]));
     let by_hand: Vec<[f32; 3]> = by_hand.map(|p| std::array::from_fn(|x| (p[x] - origin[x]) as f32)).collect();
     if !by_hand.is_empty() {
-        if roots.id.is_empty() {
+        if hairs.id.is_empty() {
             return Ok(Vec::new());
         }
         let found = nearest_hairs(hairs.position, &by_hand);
@@ -150,7 +175,8 @@ fn centre_hairs(
         let same = (1..found.len()).find(|k| found[..*k].contains(&found[*k]));
         if let Some(k) = same.filter(|_| !run.project.is_draft()) {
             let what = format!("number {k} of a clump placed by hand has the same nearest hair as one before it");
-            return Err(run.project.groom.error(at, what, "place them farther apart, or grow more hair there").into());
+            let at = format!("layer[{i}].clump[{k}]");
+            return Err(run.project.groom.error(&at, what, "place them farther apart, or grow more hair there").into());
         }
         return Ok(found);
     }
@@ -158,7 +184,7 @@ fn centre_hairs(
     let value = density.at(0.0) * run.project.cm2_per_unit2();
     let factor = column(run, hairs, "density", density, false)?;
     let area = groom::skin(run)?.area();
-    Ok(centres(&roots.id, area, &|h| value * f64::from(*factor.get(h).unwrap_or(&1.0)), open))
+    Ok(centres(hairs.id, area, &|h| value * f64::from(*factor.get(h).unwrap_or(&1.0)), open))
 }
 
 fn in_regions(

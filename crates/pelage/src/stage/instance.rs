@@ -1,9 +1,10 @@
 //! Instance: roots, ids, weights and features of every hair, on the rest pose, once per groom. One cache entry a column.
 
+use super::plan_kept::hairs_of;
 use super::run::{Counts, Runner};
 use super::skin::Texel;
 use super::tables::{decode, encode, id_columns, ids_of, root_columns, roots_of, table, vector_columns, vectors_of};
-use super::{Skin, What, candidate_density, groom, layer_seed};
+use super::{Skin, What, candidate_density, groom, kept, layer_seed};
 use crate::Error;
 use crate::config::{Feature, Guard};
 use crate::format::ply::Column;
@@ -72,17 +73,25 @@ fn search(skin: &Skin, seed: u32, count: usize) -> Candidates {
         .expect("nothing stops the search")
 }
 
-/// Roots of a layer's hairs: the candidates whose rank is below the local density.
+/// Roots of a layer's hairs, of those that the shot needs.
 pub fn roots(run: &mut Runner<'_>, i: usize) -> Result<Rc<Roots>, Error> {
     if let Some(found) = run.roots.get(&i) {
         return Ok(found.clone());
     }
-    let found = match run.fetch(What::Roots(i)).and_then(|e| decode_roots(e.payload.first()?)) {
-        Some(found) => Rc::new(found),
-        None => Rc::new(grow(run, i)?),
+    let found = match hairs_of(run.project, i) {
+        What::Kept(_) => kept::kept_hairs(run, i)?.roots,
+        _ => Rc::new(grown(run, i)?),
     };
     run.roots.insert(i, found.clone());
     Ok(found)
+}
+
+/// Roots of all of a layer's hairs: the candidates whose rank is below the local density.
+pub fn grown(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
+    match run.fetch(What::Roots(i)).and_then(|e| decode_roots(e.payload.first()?)) {
+        Some(found) => Ok(found),
+        None => grow(run, i),
+    }
 }
 
 fn grow(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
@@ -109,19 +118,25 @@ fn grow(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
         ("hairs".to_owned(), found.id.len() as u64),
         (format!("hairs in layer {}", layer.name), found.id.len() as u64),
     ]);
-    let columns = [
-        id_columns(&found.id),
-        root_columns(&found.root),
-        vector_columns(["u", "v"], &found.uv),
-        vec![("chart", Column::U32(found.chart.clone()))],
-    ];
-    let file =
-        encode("hairs: id, root on the rest skin, texture coordinates, chart", &[table("hair", columns.concat())]);
+    let comment = "hairs: id, root on the rest skin, texture coordinates, chart";
+    let file = encode(comment, &[table("hair", roots_columns(&found))]);
     run.keep(What::Roots(i), counts, &[("data.ply", &file)])?;
     Ok(found)
 }
 
-fn decode_roots(bytes: &[u8]) -> Option<Roots> {
+/// Columns of hairs.
+pub(super) fn roots_columns(roots: &Roots) -> Vec<(&'static str, Column)> {
+    let columns = [
+        id_columns(&roots.id),
+        root_columns(&roots.root),
+        vector_columns(["u", "v"], &roots.uv),
+        vec![("chart", Column::U32(roots.chart.clone()))],
+    ];
+    columns.concat()
+}
+
+/// Reads them.
+pub(super) fn decode_roots(bytes: &[u8]) -> Option<Roots> {
     let file = decode(bytes)?;
     let hair = file.get("hair")?;
     Some(Roots {
@@ -180,6 +195,28 @@ fn feature_map(run: &mut Runner<'_>, f: &Feature) -> Result<Option<TiledMap>, Er
 
 /// A column of one number per hair: length in scene units, root diameter in micrometres, opacity.
 pub fn column(run: &mut Runner<'_>, what: What, i: usize) -> Result<Vec<f32>, Error> {
+    let name = match what {
+        What::Length(_) => "length",
+        What::Width(_) => "width",
+        _ => "opacity",
+    };
+    let read = |bytes: &Vec<u8>| Some(decode(bytes)?.get("hair")?.f32(name)?.to_vec());
+    if let Some(found) = run.fetch(what).and_then(|e| read(e.payload.first()?)) {
+        return Ok(found);
+    }
+    let roots = roots(run, i)?;
+    let mut values = feature(run, what, i, &roots)?;
+    if matches!((what, hairs_of(run.project, i)), (What::Width(_), What::Kept(_))) {
+        let wider = kept::kept_hairs(run, i)?.wider;
+        values.iter_mut().zip(wider).for_each(|(w, wider)| *w *= wider);
+    }
+    let file = encode(&format!("{name} of every hair"), &[table("hair", vec![(name, Column::F32(values.clone()))])]);
+    run.keep(what, Counts::new(), &[("data.ply", &file)])?;
+    Ok(values)
+}
+
+/// A column of one number for some of a layer's hairs.
+pub(super) fn feature(run: &mut Runner<'_>, what: What, i: usize, roots: &Roots) -> Result<Vec<f32>, Error> {
     let layer = &run.project.groom.value.layer[i];
     let guard = |factor: fn(&Guard) -> f64| layer.guard.as_ref().map(|g| (g.percent, factor(g) as f32));
     let (name, feature, guard) = match what {
@@ -188,11 +225,6 @@ pub fn column(run: &mut Runner<'_>, what: What, i: usize) -> Result<Vec<f32>, Er
         What::Opacity(_) => ("opacity", layer.opacity.clone(), None),
         other => unreachable!("{other:?} is not a column"),
     };
-    let read = |bytes: &Vec<u8>| Some(decode(bytes)?.get("hair")?.f32(name)?.to_vec());
-    if let Some(found) = run.fetch(what).and_then(|e| read(e.payload.first()?)) {
-        return Ok(found);
-    }
-    let roots = roots(run, i)?;
     let map = feature_map(run, &feature)?;
     let source = FeatureSource {
         value: feature.value as f32,
@@ -201,12 +233,10 @@ pub fn column(run: &mut Runner<'_>, what: What, i: usize) -> Result<Vec<f32>, Er
         channel: rng::channel(name),
     };
     let seed = u64::from(layer_seed(&layer.name));
-    let mut values = feature_column(&roots, &source, seed);
+    let mut values = feature_column(roots, &source, seed);
     if let Some((share, factor)) = guard {
-        scale_guards(&mut values, &roots, share, factor, seed);
+        scale_guards(&mut values, roots, share, factor, seed);
     }
-    let file = encode(&format!("{name} of every hair"), &[table("hair", vec![(name, Column::F32(values.clone()))])]);
-    run.keep(what, Counts::new(), &[("data.ply", &file)])?;
     Ok(values)
 }
 

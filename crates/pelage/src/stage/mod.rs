@@ -4,8 +4,10 @@
 mod areas;
 mod body;
 mod clumps;
+mod kept;
 mod look;
 mod plan;
+mod plan_kept;
 mod plan_light;
 mod plan_look;
 mod plan_picture;

@@ -1,6 +1,7 @@
 //! Every step of a shot with its recipe: what each step reads, and nothing else, enters its key.
 
 use super::Stage;
+use super::plan_kept::hairs_of;
 use super::plan_light::shadows;
 use super::plan_look::finished_rest;
 use crate::cache::{Field, Key, Recipe};
@@ -22,6 +23,8 @@ pub enum What {
     Candidates(usize),
     /// Roots of a layer's hairs.
     Roots(usize),
+    /// Of a layer's hairs those that the shot needs.
+    Kept(usize),
     /// The three control hairs and weights of every hair of a layer.
     Weights(usize),
     /// Lengths.
@@ -90,9 +93,10 @@ pub(super) mod version {
     pub const COMB: u32 = 1;
     pub const CANDIDATES: u32 = 1;
     pub const ROOTS: u32 = 1;
+    pub const KEPT: u32 = 1;
     pub const WEIGHTS: u32 = 1;
     pub const COLUMN: u32 = 1;
-    pub const SIMULATE: u32 = 4;
+    pub const SIMULATE: u32 = 5;
     pub const INTERPOLATE: u32 = 1;
     pub const CLUMP: u32 = 1;
     pub const LOOK: u32 = 2;
@@ -183,8 +187,8 @@ impl Plan {
         let reads: &[What] = match r.project.target(i) {
             Target::Off if r.project.curves.is_some() => &[What::Curves, What::Rest(0)],
             Target::EveryHair => &[simulated],
-            Target::ControlHairs => &[simulated, What::Roots(i), What::Weights(i), What::Length(i)],
-            Target::Off => &[What::Comb, What::Roots(i), What::Weights(i), What::Length(i)],
+            Target::ControlHairs => &[simulated, hairs_of(r.project, i), What::Weights(i), What::Length(i)],
+            Target::Off => &[What::Comb, hairs_of(r.project, i), What::Weights(i), What::Length(i)],
         };
         let name = format!("interpolate/{}/{frame}", r.project.groom.value.layer[i].name);
         self.add_hairs(r, What::Frame(i, frame), name, r.frame(i, at, frame), reads.to_vec(), at);
@@ -206,19 +210,18 @@ impl Plan {
             };
             add(What::Candidates(i), "candidates", r.candidates(i), &[]);
             add(What::Roots(i), "roots", r.roots(i), &[What::Candidates(i)]);
-            add(
-                What::Weights(i),
-                "weights",
-                Recipe::new("instance/weights", version::WEIGHTS),
-                &[What::Place, What::Roots(i)],
-            );
-            add(What::Length(i), "length", column("length", &layer.length), &[What::Roots(i)]);
-            add(What::Width(i), "width", column("width", &layer.width.feature()), &[What::Roots(i)]);
-            add(What::Opacity(i), "opacity", column("opacity", &layer.opacity), &[What::Roots(i)]);
-            add(What::Color(i), "color", r.color(i), &[What::Roots(i)]);
+            let hairs = hairs_of(project, i);
+            if hairs == What::Kept(i) {
+                add(hairs, "kept", r.kept(i), &[What::Roots(i)]);
+            }
+            add(What::Weights(i), "weights", Recipe::new("instance/weights", version::WEIGHTS), &[What::Place, hairs]);
+            add(What::Length(i), "length", column("length", &layer.length), &[hairs]);
+            add(What::Width(i), "width", column("width", &layer.width.feature()), &[hairs]);
+            add(What::Opacity(i), "opacity", column("opacity", &layer.opacity), &[hairs]);
+            add(What::Color(i), "color", r.color(i), &[hairs]);
         }
         for (i, layer) in project.groom.value.layer.iter().enumerate() {
-            let reads = [What::Comb, What::Roots(i), What::Weights(i), What::Length(i)];
+            let reads = [What::Comb, hairs_of(project, i), What::Weights(i), What::Length(i)];
             let name = format!("interpolate/{}/rest", layer.name);
             let rest = Recipe::new("interpolate", version::INTERPOLATE);
             let rest = r.skin(r.points(i, rest), &SkinAt::Rest, 0);
@@ -289,7 +292,12 @@ impl What {
     /// The layer that it belongs to, if it belongs to one.
     pub fn layer(self) -> Option<usize> {
         match self {
-            What::Candidates(i) | What::Roots(i) | What::Weights(i) | What::Rest(i) | What::Finished(i) => Some(i),
+            What::Candidates(i)
+            | What::Roots(i)
+            | What::Kept(i)
+            | What::Weights(i)
+            | What::Rest(i)
+            | What::Finished(i) => Some(i),
             What::Simulate(i, _) | What::Frame(i, _) | What::Clump(i, _) => Some(i),
             What::Length(i) | What::Width(i) | What::Opacity(i) | What::Color(i) => Some(i),
             What::Curves | What::Place | What::Comb | What::Hits(_) => None,
@@ -358,7 +366,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Fields of a feature; `name` is what it is to the step, `key` where the groom file has it.
-    fn feature(&self, name: &str, key: &str, f: &Feature) -> Vec<Field> {
+    pub(super) fn feature(&self, name: &str, key: &str, f: &Feature) -> Vec<Field> {
         let at = self.in_groom(key);
         let recipe = Recipe::new("", 0).param(&format!("{name}.value"), f.value, format!("{at}.value"));
         let recipe = recipe.param(&format!("{name}.noise"), f.noise, format!("{at}.noise"));
@@ -450,7 +458,7 @@ impl<'a> Reader<'a> {
     }
 
     /// What the column `part` of a layer reads of its guard hairs; nothing if it has none.
-    fn guard(&self, i: usize, part: &str, mut r: Recipe) -> Recipe {
+    pub(super) fn guard(&self, i: usize, part: &str, mut r: Recipe) -> Recipe {
         let Some(g) = &self.project.groom.value.layer[i].guard else { return r };
         let factor = match part {
             "length" => g.length,

@@ -2,6 +2,7 @@
 
 use super::Stage;
 use super::plan::{Plan, Reader, What, layer_seed, version};
+use super::plan_kept::hairs_of;
 use crate::cache::{Field, Recipe};
 use crate::config::{Clump, ClumpOf, Keyed, LookValue, Operator, Target, Varied};
 use crate::project::{Project, SkinAt};
@@ -137,7 +138,7 @@ impl Plan {
         let layer = &r.project.groom.value.layer[i];
         for k in acting_clumps(r.project, i) {
             let what = What::Clump(i, k as u32);
-            let mut reads = vec![What::Roots(i)];
+            let mut reads = vec![hairs_of(r.project, i)];
             reads.extend(joins_clumps(&layer.clump[k], k).then(|| What::Clump(i, k as u32 - 1)));
             let name = format!("instance/clump[{k}]/{}", layer.name);
             self.add(what, name, Stage::Instance, r.clump(i, k), &reads);
@@ -231,7 +232,7 @@ impl Reader<'_> {
         !self.project.groom.value.layer[i].clump[k].areas.is_empty()
     }
 
-    fn clump(&self, i: usize, k: usize) -> Recipe {
+    pub(super) fn clump(&self, i: usize, k: usize) -> Recipe {
         let layer = &self.project.groom.value.layer[i];
         let c = &layer.clump[k];
         let at = format!("layer[{i}].clump[{k}]");

@@ -91,7 +91,8 @@ impl Reader<'_> {
         ];
         let add =
             |r: Recipe, (key, value): (&str, String)| r.param(key, value, self.in_shot(&format!("simulate.{key}")));
-        values.into_iter().fold(r, add)
+        let tolerance = s.tolerance.map(|t| ("tolerance", t.to_string()));
+        values.into_iter().chain(tolerance).fold(r, add)
     }
 
     fn material(&self, r: Recipe, i: usize) -> Recipe {

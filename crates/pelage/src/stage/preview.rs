@@ -9,6 +9,7 @@ use crate::Error;
 use crate::config::{Keyed, PreviewTone, UpAxis, Vector};
 use crate::files::unfinished;
 use crate::format::{HairLayer, image::write_png};
+use crate::project::Project;
 use pelage_geom::{Offsets, SurfacePoint, Vec3};
 use pelage_groom::instance::is_guard;
 use pelage_groom::look::clump::sides;
@@ -151,7 +152,7 @@ pub fn turn(run: &mut Runner<'_>, k: u32) -> Result<(), Error> {
         }
         None => turning(run, &drawn, frame, count)?,
     };
-    let camera = camera.turned(axis, up(run), std::f64::consts::TAU * f64::from(k) / f64::from(count));
+    let camera = camera.turned(axis, up(run.project), std::f64::consts::TAU * f64::from(k) / f64::from(count));
     let picture = draw(run, &drawn, &Seen { camera, frame, size, region: Part::default().region(size) })?;
     save(run, What::Turn(k), &format!("turntable.{:03}.png", k + 1), &picture)
 }
@@ -212,22 +213,28 @@ fn hairs(run: &mut Runner<'_>, drawn: &Drawn, i: usize, frame: i32) -> Result<Di
     Ok(Displaced { position, wet: all.wet.into_iter().step_by(drawn.every).collect() })
 }
 
+/// The camera of `[preview.camera]` at a frame, if the shot has one.
+pub(super) fn shot_camera(project: &Project, frame: i32) -> Option<Camera> {
+    let c = project.shot.value.preview.camera.as_ref()?;
+    let at = |k: &Keyed<Vector>| k.vectors().at(f64::from(frame));
+    let (eye, target) = (at(&c.eye), at(&c.target));
+    let near = NEAR * (Vec3::from(target) - Vec3::from(eye)).norm();
+    let up = c.up.unwrap_or(up(project));
+    Some(Camera { eye, target, up, fov_y_deg: c.fov.at(f64::from(frame)), near, parallel_height: None })
+}
+
 /// The camera of the shot at a frame; without one, a camera that sees skin and hair at all of the `frames`, as near as it
 /// can.
 fn camera(run: &mut Runner<'_>, drawn: &Drawn, frames: &[i32], frame: i32) -> Result<Camera, Error> {
-    if let Some(c) = &run.project.shot.value.preview.camera {
-        let at = |k: &Keyed<Vector>| k.vectors().at(f64::from(frame));
-        let (eye, target) = (at(&c.eye), at(&c.target));
-        let near = NEAR * (Vec3::from(target) - Vec3::from(eye)).norm();
-        let up = c.up.unwrap_or(up(run));
-        return Ok(Camera { eye, target, up, fov_y_deg: c.fov.at(f64::from(frame)), near, parallel_height: None });
+    if let Some(camera) = shot_camera(run.project, frame) {
+        return Ok(camera);
     }
     if let Some((_, camera)) = run.camera.as_ref().filter(|(of, _)| of == frames) {
         return Ok(*camera);
     }
     let points = points(run, drawn, frames)?;
     let p = &run.project.shot.value.preview;
-    let camera = Camera::frame_points(points, p.from().map(|x| -x), up(run), aspect(run)).zoomed(p.zoom());
+    let camera = Camera::frame_points(points, p.from().map(|x| -x), up(run.project), aspect(run)).zoomed(p.zoom());
     run.camera = Some((frames.to_vec(), camera));
     Ok(camera)
 }
@@ -239,7 +246,7 @@ fn turning(run: &mut Runner<'_>, drawn: &Drawn, frame: i32, turns: u32) -> Resul
     }
     let points = points(run, drawn, &[frame])?;
     let p = &run.project.shot.value.preview;
-    let (camera, axis) = Camera::frame_turning(&points, p.from().map(|x| -x), up(run), aspect(run), turns);
+    let (camera, axis) = Camera::frame_turning(&points, p.from().map(|x| -x), up(run.project), aspect(run), turns);
     Ok(*run.turning.insert((camera.zoomed(p.zoom()), axis)))
 }
 
@@ -248,8 +255,8 @@ fn aspect(run: &Runner<'_>) -> f64 {
     w / h
 }
 
-fn up(run: &Runner<'_>) -> [f64; 3] {
-    if run.project.shot.value.shot.up == UpAxis::Y { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] }
+fn up(project: &Project) -> [f64; 3] {
+    if project.shot.value.shot.up == UpAxis::Y { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] }
 }
 
 /// Points of skin and hair at frames.

@@ -484,13 +484,14 @@ impl<'a> Runner<'a> {
     }
 
     fn make(&mut self, what: What) -> Result<(), Error> {
-        use super::{areas, clumps, curves, export, groom, instance, interpolate, preview, shadow, simulate};
+        use super::{areas, clumps, curves, export, groom, instance, interpolate, kept, preview, shadow, simulate};
         match what {
             What::Curves => curves::hair(self).map(drop),
             What::Place => groom::placed(self).map(drop),
             What::Comb => groom::combed(self).map(drop),
             What::Candidates(i) => instance::candidates(self, i).map(drop),
-            What::Roots(i) => instance::roots(self, i).map(drop),
+            What::Roots(i) => instance::grown(self, i).map(drop),
+            What::Kept(i) => kept::kept_hairs(self, i).map(drop),
             What::Weights(i) => instance::weights(self, i).map(drop),
             What::Length(i) | What::Width(i) | What::Opacity(i) => instance::column(self, what, i).map(drop),
             What::Color(i) => instance::color(self, i).map(drop),

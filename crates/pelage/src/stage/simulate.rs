@@ -12,6 +12,7 @@ use crate::timeline::Timeline;
 use pelage_geom::ride::{Ride, ease_positions, rides};
 use pelage_geom::{Offsets, Pose, SurfacePoint, Vec3};
 use pelage_groom::control;
+use pelage_groom::keep::near;
 use pelage_sim::{Bounds, Hairs, Model, Rigid, Root, Settings, SimError, Simulation, Span, SpanReport, Started};
 use rayon::prelude::*;
 use std::rc::Rc;
@@ -244,6 +245,7 @@ fn settings(run: &Runner<'_>, i: usize) -> Settings {
         material: run.project.material(i).1.si(),
         segments: if run.project.curves.is_some() { s.segments } else { Some(run.project.segments()) },
         substeps: s.substeps,
+        tolerance: s.tolerance.unwrap_or(Settings::default().tolerance),
         sag_free: run.project.sag_free(),
         strain_limit: s.strain_limit,
         friction: s.friction,
@@ -359,7 +361,40 @@ struct Moment {
     /// Where the coordinates of the roots are: the rigid part of a deforming skin's motion.
     placement: Rigid,
     root: Vec<Root>,
+    /// A skin that deforms.
+    skin: Option<Deformed>,
     end: Option<Rc<body::End>>,
+}
+
+/// A skin that deforms, scene units.
+struct Deformed {
+    position: Vec<[f64; 3]>,
+    /// Roots on it, relative to the skin's origin.
+    root: Vec<[f32; 3]>,
+}
+
+/// Hairs around which a skin that deforms stays as it is from one frame to the next. Nothing else may move.
+fn still(run: &mut Runner<'_>, source: &Source, before: &Deformed, now: &Deformed) -> Result<Vec<bool>, Error> {
+    let skin = groom::skin(run)?;
+    let (unit, origin) = (run.project.shot.value.shot.meters_per_unit, skin.origin());
+    let moves = |v: &u32| before.position[*v as usize] != now.position[*v as usize];
+    let (mut moving, mut longest) = (vec![false; now.position.len()], 0.0f64);
+    for t in skin.mesh.triangle.iter().filter(|t| t.iter().any(moves)) {
+        t.iter().for_each(|v| moving[*v as usize] = true);
+        for pose in [&before.position, &now.position] {
+            let corner = t.map(|v| Vec3::from(pose[v as usize]));
+            longest = (0..3).map(|k| (corner[k] - corner[(k + 1) % 3]).norm()).fold(longest, f64::max);
+        }
+    }
+    let of = |pose: &[[f64; 3]]| -> Vec<[f32; 3]> {
+        let relative = |p: &[f64; 3]| std::array::from_fn(|x| (p[x] - origin[x]) as f32);
+        pose.iter().zip(&moving).filter(|(_, m)| **m).map(|(p, _)| relative(p)).collect()
+    };
+    let place = [of(&before.position), of(&now.position)].concat();
+    // What moves of a triangle is no farther from one of its corners than its longest edge.
+    let reach = |h: usize| ((source.length(h) * REACH + MARGIN) / unit + longest) as f32;
+    let distance: Vec<f32> = (0..source.id.len()).map(reach).collect();
+    Ok(near(&now.root, &distance, &place).into_iter().map(|near| !near).collect())
 }
 
 fn moment(
@@ -381,22 +416,45 @@ fn moment(
     let root: Vec<Root> = rides.par_iter().map(root).collect();
     let region = source.region(root.iter().map(|r| r.position));
     let end = colliders.end(position.as_deref(), unit, &placement, region);
-    Ok(Moment { placement, root, end })
+    let origin = run.origin()?;
+    let relative = |r: &Ride| std::array::from_fn(|x| (r.position[x] - origin[x]) as f32);
+    let skin = position.map(|position| Deformed { position, root: rides.iter().map(relative).collect() });
+    Ok(Moment { placement, root, skin, end })
 }
 
 impl Source {
+    /// Length of a hair, metres.
+    fn length(&self, h: usize) -> f64 {
+        let hair = &self.position[self.offsets.range(h)];
+        hair.windows(2).map(|p| (Vec3::from(p[1]) - Vec3::from(p[0])).norm()).sum()
+    }
+
     /// Where hair can come that hangs on these roots (metres); `None` without roots.
     fn region(&self, root: impl Iterator<Item = [f64; 3]>) -> Option<Bounds> {
-        let length = |h: usize| {
-            let hair = &self.position[self.offsets.range(h)];
-            hair.windows(2).map(|p| (Vec3::from(p[1]) - Vec3::from(p[0])).norm()).sum::<f64>()
-        };
-        let longest = (0..self.id.len()).map(length).fold(0.0, f64::max);
-        let finite: Vec<[f64; 3]> = root.filter(|p| p.iter().all(|x| x.is_finite())).collect();
-        let (low, high) = bounds(&finite);
-        let reach = Vec3::repeat(longest * REACH + MARGIN);
-        (low.x <= high.x).then(|| ((low - reach).into(), (high + reach).into()))
+        let longest = (0..self.id.len()).map(|h| self.length(h)).fold(0.0, f64::max);
+        around(&root.collect::<Vec<_>>(), longest)
     }
+}
+
+/// Where hair of a length can come that hangs on these roots (metres); `None` without roots.
+fn around(root: &[[f64; 3]], longest: f64) -> Option<Bounds> {
+    let finite: Vec<[f64; 3]> = root.iter().copied().filter(|p| p.iter().all(|x| x.is_finite())).collect();
+    let (low, high) = bounds(&finite);
+    let reach = Vec3::repeat(longest * REACH + MARGIN);
+    (low.x <= high.x).then(|| ((low - reach).into(), (high + reach).into()))
+}
+
+/// The same for all hairs of a layer, with those that the shot does without: what is left must move as it does among them.
+fn whole_region(run: &mut Runner<'_>, i: usize, region: Option<Bounds>) -> Result<Option<Bounds>, Error> {
+    if run.project.curves.is_some() || run.project.target(i) != Target::EveryHair {
+        return Ok(region);
+    }
+    let (skin, all) = (groom::skin(run)?, instance::grown(run, i)?);
+    let unit = run.project.shot.value.shot.meters_per_unit;
+    let length = instance::feature(run, What::Length(i), i, &all)?;
+    let longest = length.iter().fold(0.0f32, |a, b| a.max(*b));
+    let root: Vec<[f64; 3]> = all.root.iter().map(|p| (p.blend(skin.corners(p)) * unit).into()).collect();
+    Ok(around(&root, f64::from(longest) * unit))
 }
 
 /// Simulates up to frame `end` and keeps every frame of the shot and a checkpoint now and then.
@@ -418,7 +476,8 @@ fn advance(
     let origin = run.origin()?;
     let rest = running.source.anchor.iter().map(|p| p.map(|x| x * unit));
     let region = running.source.region(rest);
-    let colliders = body::colliders(run, running.layer, body::deforms(timeline), region)?;
+    let whole = whole_region(run, running.layer, region)?;
+    let colliders = body::colliders(run, running.layer, body::deforms(timeline), [region, whole])?;
     let colliders: &Colliders = &colliders;
     let seconds = 1.0 / shot.shot.fps;
     let mut before = moment(run, timeline, &running.source, colliders, running.frame)?;
@@ -445,6 +504,13 @@ fn advance(
         let winds = wind.map(|w| [from, frame as f64].map(|f| w.at(f, shot.shot.fps)));
         let own = colliders.motions(from, unit);
         let body = colliders.body(&motion, &own, moving.as_ref(), seconds);
+        let still = match (&before.skin, &now.skin) {
+            (Some(a), Some(b)) if own.iter().all(|m| m(0.0) == m(0.5) && m(0.0) == m(1.0)) => {
+                still(run, &running.source, a, b)?
+            }
+            (Some(_), Some(_)) => vec![false; running.source.id.len()],
+            _ => Vec::new(),
+        };
         let span = Span {
             seconds,
             time: timeline.seconds(from),
@@ -454,6 +520,7 @@ fn advance(
             body: &body,
             gravity: [gravity.at(from), gravity.at(frame as f64)],
             wind: winds.as_ref().map(|[a, b]| [a, b]),
+            still: &still,
         };
         let clock = Instant::now();
         let ticker = run.ticker(&format!("{layer} {frame}"));

@@ -59,6 +59,7 @@ fn looped(write: Write) {
             body: &Body::default(),
             gravity: [gravity; 2],
             wind: None,
+            still: &[],
         };
         let r = shot.sim.advance(&span, &|_| true).expect("runs on");
         if (frame + 1) % 24 == 0 {

@@ -14,7 +14,7 @@ pub use closed::Closed;
 pub use deforming::Deforming;
 pub use ellipsoid::Ellipsoid;
 pub use field::{Bounds, Field, FieldSettings, Flow};
-pub use rigid_fit::{RigidFit, rigid_fit};
+pub use rigid_fit::{RigidFit, rigid_fit, rigid_part};
 pub use table::Table;
 
 use crate::Vec3;

@@ -47,6 +47,53 @@ pub fn rigid_fit(from: &[[f64; 3]], to: &[[f64; 3]]) -> RigidFit {
     RigidFit { motion, rms: (sum / n).sqrt(), largest: largest.sqrt() }
 }
 
+/// Rounds of [`rigid_part`]: it has settled after three or four where there is such a part.
+const ROUNDS: usize = 10;
+
+/// What is left of a part that moves as a whole, relative to its size: the rounding of positions in files.
+const RIGID: f64 = 1e-6;
+
+/// The motion of at least half of the points that move as a whole, if there are such (least trimmed squares by concentration,
+/// Rousseeuw and Van Driessen 1999, from the fit of all); else the fit of all. Where most of a skin stays as it is, its motion
+/// does not follow the rest, which jitters.
+pub fn rigid_part(from: &[[f64; 3]], to: &[[f64; 3]]) -> RigidFit {
+    let all = rigid_fit(from, to);
+    let finite = |i: &usize| from[*i].iter().chain(&to[*i]).all(|x| x.is_finite());
+    let points: Vec<usize> = (0..from.len()).filter(finite).collect();
+    let pick = |chosen: &[usize], of: &[[f64; 3]]| chosen.iter().map(|i| of[*i]).collect::<Vec<_>>();
+    let size = points.iter().map(|i| (Vec3::from(from[*i]) - Vec3::from(from[points[0]])).norm()).fold(0.0, f64::max);
+    if all.largest <= RIGID * size || points.len() < 6 {
+        return all;
+    }
+    let mut fit = all;
+    for _ in 0..ROUNDS {
+        let left = |i: usize| (fit.motion.apply(Vec3::from(from[i])) - Vec3::from(to[i])).norm();
+        let mut ranked: Vec<(f64, usize)> = points.iter().map(|i| (left(*i), *i)).collect();
+        ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let half: Vec<usize> = ranked[..points.len().div_ceil(2)].iter().map(|r| r.1).collect();
+        fit = rigid_fit(&pick(&half, from), &pick(&half, to));
+    }
+    if fit.largest > RIGID * size {
+        return all;
+    }
+    // All that moves so, in the order of the points: the same part gives the same motion, whatever the others do.
+    let near = |i: &usize| (fit.motion.apply(Vec3::from(from[*i])) - Vec3::from(to[*i])).norm() <= RIGID * size;
+    let part: Vec<usize> = points.into_iter().filter(near).collect();
+    let RigidFit { motion, .. } = rigid_fit(&pick(&part, from), &pick(&part, to));
+    let left: Vec<f64> = from
+        .iter()
+        .zip(to)
+        .map(|(a, b)| (motion.apply(Vec3::from(*a)) - Vec3::from(*b)).norm_squared())
+        .filter(|d| d.is_finite())
+        .collect();
+    let sum: f64 = left.iter().sum();
+    RigidFit {
+        motion,
+        rms: (sum / left.len() as f64).sqrt(),
+        largest: left.iter().fold(0.0f64, |a, b| a.max(*b)).sqrt(),
+    }
+}
+
 /// Unit quaternion (x, y, z, w) for sums of products s[i][j] = sum of from_i to_j; w is not negative.
 fn horn(s: &[[f64; 3]; 3]) -> [f64; 4] {
     let [[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]] = *s;
@@ -105,6 +152,24 @@ mod tests {
             let other = Rigid { rotation: [c.x, c.y, c.z, c.w], translation: shift.into() };
             assert!(cost(&other) > cost(&fit.motion));
         }
+    }
+
+    /// Where 60 % of the points move as a whole it is their motion that is found; where none do, the fit of all.
+    #[test]
+    fn the_part_that_moves_as_a_whole_is_found() {
+        let q = UnitQuaternion::from_scaled_axis(Vector3::new(0.2, -0.4, 0.1));
+        let from = points(100);
+        let swung = |i: usize, p: &[f64; 3]| {
+            let bent = if i % 5 < 2 { Vector3::new(0.03 + 0.2 * p[0], 0.0, -0.1 * p[1]) } else { Vector3::zeros() };
+            (q * (Vec3::from(*p) + bent) + Vector3::y()).into()
+        };
+        let to: Vec<[f64; 3]> = from.iter().enumerate().map(|(i, p)| swung(i, p)).collect();
+        let fit = rigid_part(&from, &to);
+        let off = |i: usize| (fit.motion.apply(Vec3::from(from[i])) - Vec3::from(to[i])).norm();
+        assert!((0..100).filter(|i| i % 5 >= 2).all(|i| off(i) < 1e-14), "{fit:?}");
+        assert!(fit.largest > 0.01);
+        let soft: Vec<[f64; 3]> = from.iter().map(|p| [p[0] + 0.3 * p[1] * p[1], p[1], p[2]]).collect();
+        assert_eq!(rigid_part(&from, &soft), rigid_fit(&from, &soft));
     }
 
     #[test]

@@ -205,7 +205,17 @@ fn bad_tip(model: Model, m: &mut Measures, bad: f64) -> Done {
     let move_on = |rig: &mut Rig, tips: [&[Root]; 2]| -> Done {
         let roots: [&[Root]; 2] = [&rig.roots, &rig.roots];
         let (time, gravity, body) = (rig.time, [rig.gravity; 2], &Body::default());
-        let span = Span { seconds: FRAME, time, motion: &still, roots, tips: Some(tips), body, gravity, wind: None };
+        let span = Span {
+            seconds: FRAME,
+            time,
+            motion: &still,
+            roots,
+            tips: Some(tips),
+            body,
+            gravity,
+            wind: None,
+            still: &[],
+        };
         rig.last = rig.sim.advance(&span, &|_| true)?;
         rig.time += FRAME;
         Ok(())

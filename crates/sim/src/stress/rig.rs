@@ -100,6 +100,7 @@ impl Rig {
             body,
             gravity: [self.gravity; 2],
             wind: wind.map(|w| [w, w]),
+            still: &[],
         };
         self.last = self.sim.advance(&span, &|_| true)?;
         self.time += seconds;

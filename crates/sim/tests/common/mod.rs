@@ -176,6 +176,7 @@ impl Shot {
             body: &Body::default(),
             gravity: [self.gravity; 2],
             wind: None,
+            still: &[],
         };
         self.last = self.sim.advance(&span, &|_| true).unwrap();
         self.time += seconds;
@@ -215,6 +216,7 @@ impl Shot {
             body,
             gravity: [self.gravity; 2],
             wind: wind.map(|w| [w, w]),
+            still: &[],
         };
         self.last = self.sim.advance(&span, &|_| true).unwrap();
         self.time += seconds;

@@ -47,13 +47,18 @@ impl Field {
                 return false;
             }
         }
-        let cells = |voxel: f64| [0, 1, 2].map(|i| ((high[i] - low[i]) / (CELLS as f64 * voxel)).ceil().max(1.0));
+        // Cells lie as if the lattice filled space: what a part of a mesh gives does not depend on where the rest of it ends, or
+        // the region.
+        let first = |i: usize, voxel: f64| (low[i] / (CELLS as f64 * voxel)).floor();
+        let count = |i: usize, voxel: f64| ((high[i] / (CELLS as f64 * voxel)).ceil() - first(i, voxel)).max(1.0);
         self.settings.voxel = voxel;
-        while cells(self.settings.voxel).iter().product::<f64>() > MOST_CELLS {
+        while (0..3).map(|i| count(i, self.settings.voxel)).product::<f64>() > MOST_CELLS {
             self.settings.voxel *= 1.25;
         }
-        self.cells = cells(self.settings.voxel).map(|n| n as usize);
-        self.per_voxel = 1.0 / self.settings.voxel;
+        let voxel = self.settings.voxel;
+        self.cells = std::array::from_fn(|i| count(i, voxel) as usize);
+        self.per_voxel = 1.0 / voxel;
+        let low = std::array::from_fn(|i| first(i, voxel) * self.cell_size());
         self.domain = (low, std::array::from_fn(|i| low[i] + self.cells[i] as f64 * self.cell_size()));
         true
     }

@@ -1,0 +1,185 @@
+//! Kept: of the hairs that a layer has, those that the shot needs (`[skip]`), once for all frames.
+
+use super::plan_look::acting_clumps;
+use super::run::{Counts, Runner};
+use super::skin::{Texel, read_map};
+use super::tables::{decode, encode, table};
+use super::{What, clumps, groom, instance, layer_seed, preview};
+use crate::Error;
+use crate::format::ply::Column;
+use pelage_geom::Vec3;
+use pelage_groom::instance::{Density, Roots};
+use pelage_groom::interpolate::root_positions;
+use pelage_groom::keep::{around, kept, shares};
+use pelage_groom::look::member::rest_sites;
+use pelage_groom::look::vary::Drawn;
+use pelage_light::visible::{Depths, Sight};
+use rayon::prelude::*;
+use std::rc::Rc;
+
+/// Map value from which hair is made.
+const OPEN: f32 = 0.5;
+
+/// Least part of a layer's hairs that distance leaves: of fewer, single hairs show as bars.
+const LEAST: f64 = 1.0 / 64.0;
+
+/// How far hair comes from its root, in lengths: simulated hair stretches by up to a hundredth, and the look displaces it.
+/// What curls and waves add beyond that the margin holds.
+const REACH: f64 = 1.05;
+
+/// Counts of hairs that are left out, by reason.
+pub(super) const LEFT_OUT: [&str; 4] =
+    ["hairs masked", "hairs out of the picture", "hairs behind the skin", "hairs thinned by distance"];
+
+/// Hairs that are left.
+#[derive(Debug)]
+pub struct Kept {
+    /// Their roots.
+    pub roots: Rc<Roots>,
+    /// Factor on their diameter: 1 over the part that distance leaves.
+    pub wider: Vec<f32>,
+}
+
+/// Hairs of a layer that the shot needs.
+pub fn kept_hairs(run: &mut Runner<'_>, i: usize) -> Result<Kept, Error> {
+    let read = |bytes: &Vec<u8>| {
+        let wider = decode(bytes)?.get("hair")?.f32("wider")?.to_vec();
+        Some(Kept { roots: Rc::new(instance::decode_roots(bytes)?), wider })
+    };
+    if let Some(found) = run.fetch(What::Kept(i)).and_then(|e| read(e.payload.first()?)) {
+        return Ok(found);
+    }
+    let all = instance::grown(run, i)?;
+    let mut counts = Counts::new();
+    let Choice { keep, wider } = choose(run, i, &all, &mut counts)?;
+    let roots = kept(&all, &keep);
+    let wider: Vec<f32> = wider.iter().zip(&keep).filter(|(_, k)| **k).map(|(w, _)| *w).collect();
+    counts.insert("hairs that the shot needs".to_owned(), roots.id.len() as u64);
+    let mut columns = instance::roots_columns(&roots);
+    columns.push(("wider", Column::F32(wider.clone())));
+    let file = encode("hairs that the shot needs: as hairs, and a factor on the diameter", &[table("hair", columns)]);
+    run.keep(What::Kept(i), counts, &[("data.ply", &file)])?;
+    Ok(Kept { roots: Rc::new(roots), wider })
+}
+
+/// Which hairs are kept, and how much wider each is.
+struct Choice {
+    keep: Vec<bool>,
+    wider: Vec<f32>,
+}
+
+fn choose(run: &mut Runner<'_>, i: usize, all: &Roots, counts: &mut Counts) -> Result<Choice, Error> {
+    let project = run.project;
+    let (skip, unit) = (&project.shot.value.skip, project.shot.value.shot.meters_per_unit);
+    let margin = skip.margin(unit);
+    let skin = groom::skin(run)?;
+    let (position, _) = rest_sites(&groom::view(&skin), &all.root, skin.origin());
+    let n = all.id.len();
+    let mut left_out = [0u64; LEFT_OUT.len()];
+    let mut keep = vec![true; n];
+    if let (Some(m), Some(tiles)) = (&skip.mask, &project.mask) {
+        let map = read_map(tiles, m, Texel::Value, &mut run.warnings)?;
+        let open: Vec<bool> = all.uv.par_iter().map(|uv| map.value(*uv) >= OPEN).collect();
+        keep = around(&position, &open, margin as f32);
+        left_out[0] = keep.iter().filter(|k| !**k).count() as u64;
+    }
+    let mut part = vec![1.0f32; n];
+    if skip.sees() {
+        let found = seen(run, i, all, margin)?;
+        for (h, (sight, pixels)) in found.into_iter().enumerate() {
+            if skip.camera && keep[h] && sight != Sight::Seen {
+                left_out[if sight == Sight::Outside { 1 } else { 2 }] += 1;
+                keep[h] = false;
+            }
+            if let Some(lod) = skip.lod {
+                part[h] = (f64::from(pixels) / lod).clamp(LEAST, 1.0) as f32;
+            }
+        }
+    }
+    let mut wider = vec![1.0f32; n];
+    if skip.lod.is_some() {
+        let layer = &project.groom.value.layer[i];
+        let map = layer.density.map().map(|m| run.map(&m, Texel::Value)).transpose()?;
+        let on_off = layer.on_off.as_ref().map(|m| run.map(m, Texel::Value)).transpose()?;
+        let value = layer.density.value * project.cm2_per_unit2();
+        let density = Density { value, map: map.as_ref(), on_off: on_off.as_ref() };
+        for (h, share) in shares(all, &density, skin.area()).into_iter().enumerate() {
+            wider[h] = 1.0 / part[h];
+            if keep[h] && share > part[h] {
+                left_out[3] += 1;
+                keep[h] = false;
+            }
+        }
+    }
+    let wanted = keep.clone();
+    if keep.iter().any(|k| !*k) {
+        add_centres(run, i, all, &position, &mut keep)?;
+    }
+    // A centre that is there for its clump only is no wider than it was.
+    (0..n).filter(|h| !wanted[*h]).for_each(|h| wider[h] = 1.0);
+    counts.extend(LEFT_OUT.iter().zip(left_out).filter(|(_, n)| *n > 0).map(|(name, n)| ((*name).to_owned(), n)));
+    let centres = keep.iter().zip(&wanted).filter(|(k, w)| **k && !**w).count() as u64;
+    counts.insert("hairs kept as centres of clumps".to_owned(), centres);
+    Ok(Choice { keep, wider })
+}
+
+/// What the camera sees of each hair over all frames, with a margin around it: of sights the best, of widths in pixels the largest.
+fn seen(run: &mut Runner<'_>, i: usize, all: &Roots, margin: f64) -> Result<Vec<(Sight, f32)>, Error> {
+    let project = run.project;
+    let skin = groom::skin(run)?;
+    let length = instance::feature(run, What::Length(i), i, all)?;
+    let width = instance::feature(run, What::Width(i), i, all)?;
+    let unit = project.shot.value.shot.meters_per_unit;
+    let size = project.shot.value.preview.size.map(|s| s as usize);
+    let origin = Vec3::from(skin.origin());
+    let mut found = vec![(Sight::Outside, 0.0f32); all.id.len()];
+    for (frame, at) in &project.frames {
+        run.working(&format!("what the camera sees at {frame}"));
+        let camera = preview::shot_camera(project, *frame).expect("checked: what the camera decides has one");
+        let pose = groom::pose(run, at)?;
+        let depths = Depths::new(&camera, size, &pose.position, &skin.mesh.triangle);
+        let root = root_positions(&skin.mesh, &pose, &all.root, skin.origin());
+        found.par_iter_mut().enumerate().for_each(|(h, (best, pixels))| {
+            let centre = origin + Vec3::from(root[h].map(f64::from));
+            let reach = f64::from(length[h]) * REACH;
+            let width = f64::from(width[h]) * 1e-6 / unit;
+            *pixels = pixels.max(depths.pixels(centre, reach, width) as f32);
+            if *best != Sight::Seen {
+                match depths.sight(centre, reach + margin) {
+                    Sight::Outside => {}
+                    sight => *best = sight,
+                }
+            }
+        });
+    }
+    Ok(found)
+}
+
+/// Keeps the centres that hairs which are kept are drawn to, level after level: whatever is in a clump of a finer level goes
+/// where the centre of that goes.
+fn add_centres(
+    run: &mut Runner<'_>,
+    i: usize,
+    all: &Roots,
+    position: &[[f32; 3]],
+    keep: &mut Vec<bool>,
+) -> Result<(), Error> {
+    let layer = &run.project.groom.value.layer[i];
+    let hairs = Drawn { id: &all.id, uv: &all.uv, position, seed: u64::from(layer_seed(&layer.name)) };
+    for k in acting_clumps(run.project, i) {
+        if layer.clump[k].regions.is_some() {
+            // The centre of a region is found among all of its hairs.
+            run.warn_once(format!(
+                "layer {}: its clumps by regions need all hairs: [skip] leaves none out",
+                layer.name
+            ));
+            keep.fill(true);
+            return Ok(());
+        }
+        let centre = clumps::centre_hairs(run, i, k, &hairs, &[])?;
+        let reach = clumps::sizes(run, i, k, &hairs)?.most();
+        let near = around(position, keep, reach);
+        centre.into_iter().map(|h| h as usize).filter(|h| near[*h]).for_each(|h| keep[h] = true);
+    }
+    Ok(())
+}
