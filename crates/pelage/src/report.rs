@@ -12,6 +12,32 @@ pub struct Report {
     pub version: String,
     /// One entry a stage, in order.
     pub stages: Vec<StageReport>,
+    /// What was not computed, what that saved, and what error it leaves.
+    pub skips: Vec<Skipped>,
+}
+
+/// Something that was not computed.
+#[derive(Clone, Debug, Serialize)]
+pub struct Skipped {
+    /// The stage that would have.
+    pub stage: String,
+    /// What.
+    pub what: String,
+    /// How many, of how many.
+    pub count: u64,
+    /// How many there are with those that were computed.
+    pub of: u64,
+    /// About how many seconds that saved; nothing where it was never measured.
+    pub saved_s: Option<f64>,
+    /// Bound of the error that it leaves.
+    pub error: String,
+}
+
+impl Skipped {
+    /// One.
+    pub fn new(stage: &str, what: &str, count: u64, of: u64, saved_s: Option<f64>, error: &str) -> Self {
+        Skipped { stage: stage.to_owned(), what: what.to_owned(), count, of, saved_s, error: error.to_owned() }
+    }
 }
 
 /// What happened in a stage.
@@ -37,6 +63,21 @@ pub struct StageReport {
     pub skipped: BTreeMap<String, u64>,
     /// Warnings.
     pub warnings: Vec<String>,
+    /// Steps that ran, that were in the cache, and that turned out to be another step of this run.
+    #[serde(skip)]
+    pub made: usize,
+    /// See `made`.
+    #[serde(skip)]
+    pub from_cache: usize,
+    /// See `made`.
+    #[serde(skip)]
+    pub alike: usize,
+    /// Seconds that the stage's steps took when they ran last.
+    #[serde(skip)]
+    pub known_s: f64,
+    /// Of these, seconds of this run.
+    #[serde(skip)]
+    pub spent_s: f64,
 }
 
 impl Report {

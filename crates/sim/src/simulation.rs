@@ -76,6 +76,8 @@ pub struct Started {
     pub particles: u64,
     /// Memory of model and state, bytes.
     pub bytes: u64,
+    /// Strands that can't twist: they have three unknowns a node instead of four.
+    pub untwisted: u64,
     /// Strands that had to be stiffened.
     pub stiffened: Vec<StiffenedStrand>,
     /// Strands too short to simulate: they ride with their roots.
@@ -250,6 +252,7 @@ impl Simulation {
         let started = Started {
             particles: pick.len() as u64,
             bytes: (nodes * NODE_BYTES) as u64,
+            untwisted: plain.len() as u64,
             stiffened: figures
                 .iter()
                 .flat_map(|f| &f.stiffened)

@@ -6,6 +6,7 @@
 //! <cache>/v1/tmp/                                entries being written
 //! <cache>/v1/unfinished/                         steps that take long, see `long_step`
 //! <cache>/v1/last/<shot>.json                    the recipe that each step of a shot last had, for reasons
+//! <cache>/v1/seconds/<shot>.json                 what its steps took when they ran last, for reports
 //! <cache>/lock                                   shared by runs, exclusive for pruning
 //! ```
 
@@ -246,6 +247,20 @@ impl Store {
         let path = self.root.join("last").join(format!("{shot}.json"));
         let text = serde_json::to_vec(recipes).expect("plain JSON");
         crate::files::write_whole(&path, |f| f.write_all(&text))
+    }
+
+    /// Seconds that a shot's steps took when they ran last, by name, with their keys; none where they are not known.
+    pub fn seconds(&self, shot: &str) -> BTreeMap<String, (String, f64)> {
+        let path = self.root.join("seconds").join(format!("{shot}.json"));
+        std::fs::read(path).ok().and_then(|b| serde_json::from_slice(&b).ok()).unwrap_or_default()
+    }
+
+    /// Keeps them. Losing them costs only what a report says, so a failure is not an error.
+    pub fn set_seconds(&self, shot: &str, seconds: &BTreeMap<String, (String, f64)>) {
+        let folder = self.root.join("seconds");
+        let text = serde_json::to_vec(seconds).expect("plain JSON");
+        let _ = std::fs::create_dir_all(&folder)
+            .and_then(|()| crate::files::write_whole(&folder.join(format!("{shot}.json")), |f| f.write_all(&text)));
     }
 
     fn keys(&self) -> io::Result<Vec<Key>> {

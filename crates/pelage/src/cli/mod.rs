@@ -108,6 +108,9 @@ pub struct RunArguments {
     /// Stage that runs again whether its results are there or not
     #[arg(long, value_enum)]
     pub force: Option<Stage>,
+    /// Say what was not computed, what that saved, and what error it leaves
+    #[arg(long)]
+    pub explain_skips: bool,
     /// Report as JSON on stdout
     #[arg(long)]
     pub json: bool,

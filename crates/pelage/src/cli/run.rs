@@ -7,7 +7,7 @@ use crate::files::write_whole;
 use crate::progress::Progress;
 use crate::project::Project;
 use crate::quality;
-use crate::report::Report;
+use crate::report::{Report, Skipped};
 use crate::stage::{Options, Pictures, PlannedStage, Runner, Stage};
 use std::io::Write;
 
@@ -58,7 +58,11 @@ fn bring(a: &RunArguments, project: &Project, options: Options) -> Result<bool, 
     for name in leftovers(project) {
         progress.say(&format!("note: {name} in the output folder is of an earlier run: its format is not asked for"));
     }
-    print(&if a.json { report.json() } else { summary(&report, project) });
+    print(&match (a.json, a.explain_skips) {
+        (true, _) => report.json(),
+        (false, false) => summary(&report, project),
+        (false, true) => summary(&report, project) + &explained(&report.skips),
+    });
     Ok(true)
 }
 
@@ -95,6 +99,20 @@ fn summary(report: &Report, project: &Project) -> String {
         out.push('\n');
     }
     out.push_str(&format!("results in {}\n", project.label(&project.out_dir())));
+    out
+}
+
+/// What was skipped, as a table.
+fn explained(skips: &[Skipped]) -> String {
+    let mut out = String::from("not computed:\n");
+    for s in skips {
+        let saved = s.saved_s.map_or("-".to_owned(), |t| format!("{t:.1} s"));
+        let share = 100.0 * s.count as f64 / s.of.max(1) as f64;
+        out += &format!(
+            "  {:<12} {:<46} {:>9} of {:<9} ({share:3.0} %)  saved about {saved:>9}  error: {}\n",
+            s.stage, s.what, s.count, s.of, s.error
+        );
+    }
     out
 }
 

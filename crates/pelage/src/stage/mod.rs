@@ -4,6 +4,7 @@
 mod areas;
 mod body;
 mod clumps;
+mod explain;
 mod kept;
 mod look;
 mod plan;

@@ -1,5 +1,6 @@
 //! Brings a shot up to date: walks the plan, runs what is not in the cache, and says why.
 
+use super::explain::Seconds;
 use super::plan_light::is_shadowed;
 use super::{Plan, Stage, Step, What, skin};
 use crate::Error;
@@ -115,6 +116,7 @@ pub struct Runner<'a> {
     options: Options,
     last: BTreeMap<String, Recipe>,
     ran: BTreeMap<What, Counts>,
+    seconds: Seconds,
     progress: &'a mut Progress,
 }
 
@@ -132,6 +134,7 @@ impl<'a> Runner<'a> {
         let cache = project.cache_dir();
         let store = Store::open_clearing(&cache, &[&project.out_dir()]).map_err(Error::disk(&cache))?;
         let last = if options.draft { BTreeMap::new() } else { store.last(&project.shot.value.shot.name) };
+        let seconds = store.seconds(&project.shot.value.shot.name);
         Ok(Runner {
             project,
             plan: Plan::new(project),
@@ -161,6 +164,7 @@ impl<'a> Runner<'a> {
             options,
             last,
             ran: BTreeMap::new(),
+            seconds,
             progress,
         })
     }
@@ -284,7 +288,12 @@ impl<'a> Runner<'a> {
         self.plan.steps.iter().filter(|s| s.stage == stage).filter(wanted).cloned().collect()
     }
 
-    fn stages(&self) -> Vec<Stage> {
+    /// True if a picture of a frame is drawn.
+    pub(super) fn shows(&self, frame: i32) -> bool {
+        self.options.pictures.show(self.project, frame)
+    }
+
+    pub(super) fn stages(&self) -> Vec<Stage> {
         let to = self.options.to.unwrap_or(Stage::Preview);
         Stage::ALL.into_iter().filter(|s| *s <= to && self.options.without != Some(*s)).collect()
     }
@@ -373,7 +382,7 @@ impl<'a> Runner<'a> {
     pub fn run(&mut self) -> Result<Report, Error> {
         let shot = self.project.shot.value.shot.name.clone();
         let mut report =
-            Report { shot: shot.clone(), version: env!("CARGO_PKG_VERSION").to_owned(), stages: Vec::new() };
+            Report { shot: shot.clone(), version: env!("CARGO_PKG_VERSION").to_owned(), ..Report::default() };
         let names: BTreeSet<String> = self.plan.steps.iter().map(|s| s.name.clone()).collect();
         let mut last = self.last.clone();
         last.retain(|name, _| names.contains(name));
@@ -389,6 +398,11 @@ impl<'a> Runner<'a> {
         if last != self.last && !self.options.draft {
             self.store.set_last(&shot, &last).map_err(Error::disk(&self.project.cache_dir()))?;
         }
+        if !self.ran.is_empty() && !self.options.draft {
+            self.seconds.retain(|name, _| names.contains(name));
+            self.store.set_seconds(&shot, &self.seconds);
+        }
+        report.skips = self.skips(&report);
         self.hashes.borrow_mut().save();
         Ok(report)
     }
@@ -419,7 +433,13 @@ impl<'a> Runner<'a> {
                 return Err(Error::Stopped);
             }
             self.progress.working(&step.name);
+            let start = Instant::now();
             self.make(step.what)?;
+            if self.ran.contains_key(&step.what) {
+                let seconds = start.elapsed().as_secs_f64();
+                report.spent_s += seconds;
+                self.seconds.insert(step.name.clone(), (step.key.0.clone(), seconds));
+            }
             if stage != Stage::Simulate {
                 self.progress.step();
             }
@@ -429,14 +449,19 @@ impl<'a> Runner<'a> {
         }
         // A step may turn out to be finished: another of this run had the same recipe.
         let (ran, found): (Vec<&Step>, Vec<&Step>) = todo.iter().partition(|s| self.ran.contains_key(&s.what));
-        let found = found.into_iter().filter(|s| !waiting.contains(&s.what));
+        let found: Vec<&Step> = found.into_iter().filter(|s| !waiting.contains(&s.what)).collect();
+        (report.made, report.from_cache, report.alike) = (ran.len(), done.len(), found.len());
+        let known = |s: &Step| self.seconds.get(&s.name).filter(|k| k.0 == s.key.0).map_or(0.0, |k| k.1);
+        report.known_s = steps.iter().map(known).sum();
         (report.ran, report.reused) = match stage {
             Stage::Simulate => self.tally_simulated(&steps),
             _ => tally(stage, &ran, &done.iter().chain(found).collect::<Vec<_>>()),
         };
         report.counts = self.counts(&steps);
-        let skipped = report.counts.remove_entry(super::simulate::SLEEPING);
-        report.skipped.extend(skipped.filter(|s| s.1 > 0));
+        for name in super::simulate::SKIPPED.into_iter().chain([super::simulate::SLEEPING]).chain(super::kept::LEFT_OUT)
+        {
+            report.skipped.extend(report.counts.remove_entry(name).filter(|s| s.1 > 0));
+        }
         report.warnings = std::mem::take(&mut self.warnings);
         report.warnings.extend(self.store.take_warnings());
         for warning in report.warnings.iter().filter(|_| !self.options.draft) {

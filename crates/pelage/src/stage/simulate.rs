@@ -38,9 +38,21 @@ const MARGIN: f64 = 0.02;
 /// Count of strands at rest: what the stage skips.
 pub(super) const SLEEPING: &str = "sleeping_strands";
 
+/// Hairs at rest and all hairs, summed over frames: what the stage skips.
+pub(super) const SKIPPED: [&str; 2] = ["sleeping_hair_frames", "hair_frames"];
+
+/// Count of strands that can't twist: they have one unknown less a point.
+pub(super) const UNTWISTED: &str = "strands that can't twist";
+
 /// Counts that add up over stretches; of others the largest counts.
-pub(super) const SUMMED: [&str; 4] =
-    ["particle steps", "strands carried over a jump", "strands held for a frame", "roots held for a frame"];
+pub(super) const SUMMED: [&str; 6] = [
+    "particle steps",
+    "strands carried over a jump",
+    "strands held for a frame",
+    "roots held for a frame",
+    SKIPPED[0],
+    SKIPPED[1],
+];
 
 /// A layer in motion, kept from one stretch to the next.
 pub(super) struct Running {
@@ -281,6 +293,7 @@ fn note_start(
         ("hairs", hairs as u64),
         ("simulated", running.source.id.len() as u64),
         ("particles", started.particles),
+        (UNTWISTED, started.untwisted),
         ("strands stiffened so that their pose can stand", started.stiffened.len() as u64),
         ("strands too short to simulate", started.rigid.len() as u64),
     ] {
@@ -526,7 +539,7 @@ fn advance(
         let ticker = run.ticker(&format!("{layer} {frame}"));
         let report = running.sim.advance(&span, &ticker).map_err(|e| failed(run, running.layer, &e))?;
         running.frame = frame;
-        note(run, layer, frame, &report, step.counts(), clock.elapsed().as_secs_f64());
+        note(run, (layer, running.source.id.len()), frame, &report, step.counts(), clock.elapsed().as_secs_f64());
         if frame >= *timeline.stretch(k).start() {
             keep_frame(run, running, step, unit, origin)?;
         }
@@ -577,7 +590,14 @@ pub(super) fn placement(t: &pelage_geom::motion::RigidTransform, unit: f64) -> R
 }
 
 /// Counts of a frame, what is odd in it, and how it goes.
-fn note(run: &mut Runner<'_>, layer: &str, frame: i64, r: &SpanReport, counts: &mut Counts, seconds: f64) {
+fn note(
+    run: &mut Runner<'_>,
+    (layer, hairs): (&str, usize),
+    frame: i64,
+    r: &SpanReport,
+    counts: &mut Counts,
+    seconds: f64,
+) {
     let mut most = |name: &str, n: u64| {
         let at = counts.entry(name.to_owned()).or_default();
         *at = n.max(*at);
@@ -590,7 +610,8 @@ fn note(run: &mut Runner<'_>, layer: &str, frame: i64, r: &SpanReport, counts: &
     }
     most("strands that took steps of their own", r.subdivided);
     most("largest strain, millionths", (r.largest_strain * 1e6).round() as u64);
-    let values = [r.particle_steps, r.teleported, r.held.len() as u64, r.bad_roots.len() as u64];
+    let values =
+        [r.particle_steps, r.teleported, r.held.len() as u64, r.bad_roots.len() as u64, r.sleeping, hairs as u64];
     SUMMED.into_iter().zip(values).for_each(|(name, n)| *counts.entry(name.to_owned()).or_default() += n);
     let odd = [
         (&r.stopped, "strands moved too violently to be followed and were stopped"),
