@@ -4,10 +4,16 @@
 //! measured together, such as an error and the seconds that it cost. Points are kept in `points.jsonl` as soon as they are
 //! measured, so that a bench that was ended goes on where it was, and each can be measured alone.
 
+mod collision;
+mod guides;
+mod instancing;
+mod lod;
 mod machine;
 mod plot;
 mod report;
 mod scaling;
+mod shadow;
+mod shots;
 
 use crate::Error;
 use crate::progress::Progress;
@@ -28,7 +34,8 @@ pub struct Study {
 }
 
 /// All studies in the order of the report.
-pub const STUDIES: [Study; 1] = [scaling::STUDY];
+pub const STUDIES: [Study; 6] =
+    [guides::STUDY, collision::STUDY, shadow::STUDY, instancing::STUDY, lod::STUDY, scaling::STUDY];
 
 /// What a study found.
 #[derive(Debug, Default)]
