@@ -48,6 +48,7 @@ struct Pose {
 }
 
 /// A point near the surface and the exact answer.
+#[derive(Clone, Copy)]
 struct Asked {
     point: Vec3,
     distance: f64,
@@ -124,7 +125,7 @@ impl Body {
         let (middle, [low, high]) = self.head();
         let far = |f: &dyn Fn(Vec3) -> f64| {
             let all = self.scalp.iter().map(|v| f(Vec3::from(self.rest.position[*v]) - middle));
-            1.001 * all.fold(0.0, f64::max)
+            1.1 * all.fold(0.0, f64::max)
         };
         if round {
             return Table::sphere(&self.rest.bvh, middle, Vec3::y(), far(&|d| d.norm()), size);
@@ -133,11 +134,12 @@ impl Body {
         Table::cylinder(&self.rest.bvh, end(low.y), end(high.y), far(&|d| leg(d.x, d.z)), size)
     }
 
-    /// The ellipsoid of the head's vertices: all above the nape.
+    /// The ellipsoid of the head: of points even over all above the nape.
     fn ellipsoid(&self) -> Ellipsoid {
         let (_, [low, _]) = self.head();
-        let head: Vec<[f64; 3]> = self.rest.position.iter().filter(|p| p[1] > low.y).copied().collect();
-        Ellipsoid::fit(&head, &[]).expect("a head has vertices")
+        let points = self.ask(&self.rest, POINTS).into_iter().map(|a| a.point);
+        let head: Vec<[f64; 3]> = points.filter(|p| p.y > low.y).map(Into::into).collect();
+        Ellipsoid::fit(&head, &[]).expect("a head has a surface")
     }
 
     /// The rigid part of the way from rest to a pose, by the scalp.
@@ -211,7 +213,7 @@ fn stands(bench: &mut Bench<'_>, known: &Known<'_>) -> Result<Section, Error> {
          angle-weighted pseudo-normals) is the reference, asked for at 20,000 points within 2 mm of the surface. Columns \
          are the error of distance where hair grows and everywhere, the angle between the normals on the scalp, and the \
          cost on one thread, in processor time. Tables (Kurihara, Anjyo, Thalmann 1993) and the ellipsoid are of the head: \
-         their errors elsewhere only say that they do not reach there.",
+         their largest error is that on the scalp too. The ellipsoid's time is mostly that of choosing points to fit it to.",
     );
     let spacings: &[f64] = if bench.quick { &QUICK_SPACINGS } else { &SPACINGS };
     for &spacing in spacings {
@@ -227,14 +229,14 @@ fn stands(bench: &mut Bench<'_>, known: &Known<'_>) -> Result<Section, Error> {
             section.row(bench, &format!("table/{name}/{}x{}", size[0], size[1]), || {
                 let (body, asked) = known()?;
                 let (table, seconds) = timed(|| body.table(round, size));
-                Ok(costed(error(asked, &|p| table.sample(p)), seconds, 16 * size[0] * size[1]))
+                Ok(of_head(asked, &|p| table.sample(p), seconds, 16 * size[0] * size[1]))
             })?;
         }
     }
     section.row(bench, "ellipsoid", || {
         let (body, asked) = known()?;
         let (ellipsoid, seconds) = timed(|| body.ellipsoid());
-        Ok(costed(error(asked, &|p| ellipsoid.sample(p)), seconds, size_of::<Ellipsoid>()))
+        Ok(of_head(asked, &|p| ellipsoid.sample(p), seconds, size_of::<Ellipsoid>()))
     })?;
     section.row(bench, "exact", || {
         let (body, asked) = known()?;
@@ -271,6 +273,13 @@ fn stands(bench: &mut Bench<'_>, known: &Known<'_>) -> Result<Section, Error> {
     Ok(section)
 }
 
+/// Of something that stands for the head alone.
+fn of_head(asked: &[Asked], sample: &(dyn Fn(Vec3) -> Hit + Sync), seconds: f64, bytes: usize) -> [f64; 7] {
+    let hairy: Vec<Asked> = asked.iter().filter(|a| a.hairy).copied().collect();
+    let [rms, _, largest, angle, ns] = error(&hairy, sample);
+    costed([rms, f64::NAN, largest, angle, ns], seconds, bytes)
+}
+
 fn costed([a, b, c, d, e]: [f64; 5], seconds: f64, bytes: usize) -> [f64; 7] {
     [a, b, c, d, e, seconds, bytes as f64 * 1e-6]
 }
@@ -287,7 +296,7 @@ fn between(bench: &mut Bench<'_>, known: &Known<'_>) -> Result<Section, Error> {
          it; and once more to the mesh where the motion has it then, which no two frames can know. The end row is the \
          field of a pose itself: what its spacing is wrong by.",
     );
-    let spans: &[f64] = if bench.quick { &[1.0, 4.0] } else { &[1.0, 2.0, 4.0, 8.0] };
+    let spans: &[f64] = if bench.quick { &[1.0, 8.0] } else { &[1.0, 2.0, 4.0, 8.0, 16.0] };
     let spacing = 1e3 * FieldSettings::default().voxel;
     const START: f64 = 1.2;
     for &frames in spans {
@@ -398,6 +407,8 @@ fn answers(stands: &Section, time: &Section, moving: &Section) -> Vec<String> {
     let (table, sphere, ellipsoid) =
         (row(stands, "table/cylinder/256x128"), row(stands, "table/sphere/256x128"), row(stands, "ellipsoid"));
     let (mixed, followed, end) = (row(time, "1-frames/mixed"), row(time, "1-frames/followed"), row(time, "end"));
+    let far = time.rows.iter().rev().find_map(|(n, _)| n.strip_suffix("-frames/followed")).unwrap_or_default();
+    let [far_mixed, far_followed] = ["mixed", "followed"].map(|n| row(time, &format!("{far}-frames/{n}")));
     let (f, t, e) = (row(moving, "nod/field"), row(moving, "nod/table/sphere"), row(moving, "nod/ellipsoid"));
     let at = |v: &Vec<f64>, k: usize| v.get(k).copied().unwrap_or(f64::NAN);
     let fine = row(stands, &format!("field/{}-mm", 0.5 * default));
@@ -427,11 +438,15 @@ fn answers(stands: &Section, time: &Section, moving: &Section) -> Vec<String> {
         ),
         format!(
             "Half-way through a frame in which the skin moves {:.0} mm, fields mixed in time are wrong by {:.2} mm RMS, \
-             followed by their flow by {:.3} mm: no more than the field of a frame itself ({:.3} mm).",
+             followed by their flow by {:.3} mm, the field of a frame itself by {:.3} mm; over {far} such frames, where it \
+             moves {:.0} mm, by {:.2} and {:.3} mm.",
             at(&mixed, 0),
             at(&mixed, 1),
             at(&followed, 1),
-            at(&end, 1)
+            at(&end, 1),
+            at(&far_mixed, 0),
+            at(&far_mixed, 1),
+            at(&far_followed, 1)
         ),
         format!(
             "Of the early stand-ins the cylinder's table is wrong by {:.2} mm on the scalp, the ball's by {:.2}, one \

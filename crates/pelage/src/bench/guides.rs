@@ -81,7 +81,7 @@ const QUICK: f64 = 0.06;
 /// The sample bust shaking its head; in the quick bench with fewer hairs and the first frames only.
 fn shot(folder: &Path, quick: bool) -> Result<Project, Error> {
     let bust = shots::project(folder, Sample::Bust)?;
-    Ok(if quick { shots::thinned(&shots::until(bust, 1006), QUICK) } else { shots::until(bust, 1024) })
+    Ok(if quick { shots::thinned(&shots::until(bust, 1004), QUICK) } else { shots::until(bust, 1024) })
 }
 
 /// Every third frame is compared.
@@ -339,7 +339,7 @@ fn answers(section: &Section, step: f64) -> Vec<String> {
     let (Some(all), Some(some), Some(few)) = (row(1), row(16), row(256)) else { return Vec::new() };
     let below = |limit: f64| {
         let found = section.rows.iter().skip(1).rfind(|(_, v)| v[2] <= limit);
-        found.map_or("no share below all of them".to_owned(), |(n, _)| n.replace('-', " "))
+        found.map_or("no share measured".to_owned(), |(n, _)| n.replace('-', " "))
     };
     vec![
         format!(
@@ -356,8 +356,9 @@ fn answers(section: &Section, step: f64) -> Vec<String> {
             few[6]
         ),
         format!(
-            "RMS is within the error of the default steps ({step:.2} mm) with {}, within a hair's diameter ({HAIR} mm) \
-             with {}: for hair that differs from its neighbours there is no safe share, so the default simulates every hair.",
+            "The error of guides falls below that of the default steps ({step:.2} mm RMS) with {}, below a hair's diameter \
+             ({HAIR} mm) with {}: where hair is groomed to differ from its neighbours no share is safe, so by default every \
+             hair is simulated.",
             below(step),
             below(HAIR)
         ),

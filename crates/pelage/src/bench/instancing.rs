@@ -174,9 +174,8 @@ const SEAM: (usize, f32) = (13, 24.0);
 fn seams_section(bench: &mut Bench<'_>, known: &Known<'_>) -> Result<Section, Error> {
     let mut section = Section::new("Seams", &SEAMS).says(
         "On every edge of the sample bust where two charts meet, hairs of 24 cm at four places of the edge: interpolated in \
-         the one chart and in the other. They should be one hair. Control hairs on the border belong to both charts; what \
-         is left comes from the sites along the edge, between which both charts blend the same two hairs but lengths in \
-         texture space differ.",
+         the one chart and in the other. They should be one hair: control hairs on the border belong to both charts, and \
+         both blend the same two there, so that what is left should be rounding.",
     );
     section.row(bench, "bust", || {
         let g = known()?;
@@ -249,15 +248,17 @@ fn points_section(bench: &mut Bench<'_>, folder: &Path) -> Result<Section, Error
         "How far a hair with n points is from the smooth one: helices (wave: radius 5 mm, a turn in 80 mm, 240 mm long; curl: \
          8 mm, 25 mm, 240 mm; fur: 1 mm, 15 mm, 30 mm), at 4,096 places of each, with the closed form of a chord of a circle with the \
          helix's radius of curvature, R (1 - cos(s / 2R)) for pieces of length s; and the sample bust's finished hairs, \
-         clumps and all, with 256 points against fewer on the same curve. Bytes are of positions in single precision.",
+         clumps and all, with 256 points against fewer on the same curve (its control hairs have 12 points: hairs of as \
+         many hit the bends between them). Bytes are of positions in single precision.",
     );
+    let counts: &[usize] = if bench.quick { &[6, 12, 24, 48] } else { &POINT_COUNTS };
     for (name, shape) in CURLS {
-        for n in POINT_COUNTS {
+        for &n in counts {
             section.row(bench, &format!("{name}/{n}"), || Ok(helix_error(shape, n)))?;
         }
     }
     let fine = OnceCell::new();
-    for n in POINT_COUNTS {
+    for &n in counts {
         section.row(bench, &format!("bust/{n}"), || {
             let hairs = shots::lazily(&fine, || {
                 let mut project = shots::thinned(&shots::project(folder, Sample::Bust)?, 0.05);
@@ -342,7 +343,8 @@ fn density_section(bench: &mut Bench<'_>, known: &Known<'_>) -> Result<Section, 
          the same density (Poisson: the variance of a count is the count, 1 in the last column). Patches with less than \
          one hair expected are left out.",
     );
-    for cube in [1.0, 2.0, 4.0] {
+    let cubes: &[f64] = if bench.quick { &[2.0] } else { &[1.0, 2.0, 4.0] };
+    for &cube in cubes {
         for name in ["blue-noise", "random"] {
             section.row(bench, &format!("{name}/{cube}-cm"), || Ok(counted(&known()?.skin, name == "random", cube)))?;
         }
@@ -448,12 +450,12 @@ fn answers(weights: &Section, seams: &Section, points: &Section, density: &Secti
     vec![
         format!(
             "Weights of {:.0} roots are within {:.1e} of exact ones, {:.0} in another triangle; the two sides of a seam differ by \
-             {:.2} degrees at most, tips of 24 cm hair by {:.2} mm RMS.",
+             {:.4} degrees at most, tips of 24 cm hair by {:.4} mm.",
             at(&w, 0),
             at(&w, 2),
             at(&w, 1),
             at(&s, 2),
-            at(&s, 3)
+            at(&s, 4)
         ),
         format!("Points of a hair for an RMS error within a hair's breadth (0.3 mm): {}.", each.join(", ")),
         format!(
