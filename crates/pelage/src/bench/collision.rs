@@ -168,22 +168,9 @@ fn error(asked: &[Asked], sample: &(dyn Fn(Vec3) -> Hit + Sync)) -> [f64; 5] {
         }
     }
     let rms = |[s, n]: [f64; 2]| (s / n).sqrt();
-    let nanoseconds = machine::on_threads(1, || {
-        let start = machine::thread_seconds();
-        let sum: f64 = asked.iter().map(|a| sample(a.point).distance).sum();
-        std::hint::black_box(sum);
-        1e9 * (machine::thread_seconds() - start) / asked.len() as f64
-    });
-    [rms(hairy), rms(all), largest, rms(angle), nanoseconds]
-}
-
-/// What something costs to make on one thread, processor seconds.
-fn timed<T: Send>(make: impl FnOnce() -> T + Send) -> (T, f64) {
-    machine::on_threads(1, || {
-        let start = machine::thread_seconds();
-        let made = make();
-        (made, machine::thread_seconds() - start)
-    })
+    let (_, seconds) =
+        machine::alone(|| std::hint::black_box(asked.iter().map(|a| sample(a.point).distance).sum::<f64>()));
+    [rms(hairy), rms(all), largest, rms(angle), 1e9 * seconds / asked.len() as f64]
 }
 
 fn run(bench: &mut Bench<'_>) -> Result<Findings, Error> {
@@ -219,7 +206,7 @@ fn stands(bench: &mut Bench<'_>, known: &Known<'_>) -> Result<Section, Error> {
     for &spacing in spacings {
         section.row(bench, &format!("field/{spacing}-mm"), || {
             let (body, asked) = known()?;
-            let (field, seconds) = timed(|| body.field(&body.rest, spacing));
+            let (field, seconds) = machine::alone(|| body.field(&body.rest, spacing));
             Ok(costed(error(asked, &|p| field.sample(p)), seconds, field.bytes()))
         })?;
     }
@@ -228,19 +215,19 @@ fn stands(bench: &mut Bench<'_>, known: &Known<'_>) -> Result<Section, Error> {
         for &size in tables {
             section.row(bench, &format!("table/{name}/{}x{}", size[0], size[1]), || {
                 let (body, asked) = known()?;
-                let (table, seconds) = timed(|| body.table(round, size));
+                let (table, seconds) = machine::alone(|| body.table(round, size));
                 Ok(of_head(asked, &|p| table.sample(p), seconds, 16 * size[0] * size[1]))
             })?;
         }
     }
     section.row(bench, "ellipsoid", || {
         let (body, asked) = known()?;
-        let (ellipsoid, seconds) = timed(|| body.ellipsoid());
+        let (ellipsoid, seconds) = machine::alone(|| body.ellipsoid());
         Ok(of_head(asked, &|p| ellipsoid.sample(p), seconds, size_of::<Ellipsoid>()))
     })?;
     section.row(bench, "exact", || {
         let (body, asked) = known()?;
-        let (bvh, seconds) = timed(|| body.solid.bvh(&body.rest.position));
+        let (bvh, seconds) = machine::alone(|| body.solid.bvh(&body.rest.position));
         let exact = |p: Vec3| {
             let at = bvh.closest(p, f64::INFINITY).expect("a mesh");
             Hit { distance: at.signed_distance, normal: at.normal, velocity: Vec3::zeros() }
@@ -416,7 +403,7 @@ fn answers(stands: &Section, time: &Section, moving: &Section) -> Vec<String> {
         String::new()
     } else {
         format!(
-            "; half of it gives {:.3} mm for {:.0} times the time and {:.0} times the memory",
+            "; half the spacing gives {:.3} mm for {:.0} times the time and {:.0} times the memory",
             at(&fine, 0),
             at(&fine, 5) / at(&own, 5),
             at(&fine, 6) / at(&own, 6)
@@ -424,12 +411,12 @@ fn answers(stands: &Section, time: &Section, moving: &Section) -> Vec<String> {
     };
     vec![
         format!(
-            "A field with the default {default} mm between samples is wrong by {:.3} mm RMS on the scalp and by {:.2} mm at \
-             most (at ears and lips), under the {} mm that hair keeps from the skin; {} mm gives {:.3} and {:.2} mm{half}. \
-             A query takes {:.0} ns where the exact distance takes {:.0}.",
+            "A field with the default {default} mm between samples is wrong by {:.3} mm RMS on the scalp (hair keeps {} mm from \
+             the skin) and by {:.2} mm at most anywhere; {} mm gives {:.3} and {:.2} mm{half}. A query takes {:.0} ns where the \
+             exact distance takes {:.0}.",
             at(&own, 0),
-            at(&own, 2),
             Settings::default().offset * 1e3,
+            at(&own, 2),
             2.0 * default,
             at(&coarse, 0),
             at(&coarse, 2),

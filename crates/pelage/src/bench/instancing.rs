@@ -106,14 +106,7 @@ fn barycentric(t: [[f64; 2]; 3], p: [f64; 2]) -> [f64; 3] {
 }
 
 fn check_weights(sites: &Sites, triangulation: &Triangulation, roots: &Roots) -> [f64; 6] {
-    let seconds = || {
-        machine::on_threads(1, || {
-            let start = machine::thread_seconds();
-            let found = weights(roots, triangulation);
-            (found, machine::thread_seconds() - start)
-        })
-    };
-    let (found, seconds) = seconds();
+    let (found, seconds) = machine::alone(|| weights(roots, triangulation));
     let (mut points, mut other, mut worst, mut sum) = (0, 0, 0.0f64, 0.0f64);
     for (h, (&chart, &uv)) in roots.chart.iter().zip(&roots.uv).enumerate() {
         let inside = |k: usize| Some((k, barycentric(triangulation.uv[k].map(wide), wide(uv))));
@@ -388,11 +381,8 @@ fn counted(skin: &Skin, random: bool, side: f64) -> [f64; 6] {
     let density = Density { value: PER_CM2, map: Some(&map), on_off: None };
     let count = density.needed_candidates(skin.area());
     let (mesh, topology) = (&skin.mesh, &skin.topology);
-    let (mut found, nanoseconds) = machine::on_threads(1, || {
-        let start = machine::thread_seconds();
-        let found = candidates(mesh, topology, seed, count, &mut |_| true).expect("nothing stops the search");
-        (found, 1e9 * (machine::thread_seconds() - start) / count as f64)
-    });
+    let (found, seconds) = machine::alone(|| candidates(mesh, topology, seed, count, &mut |_| true));
+    let mut found = found.expect("nothing stops the search");
     if random {
         found.root = at_random(skin, count);
     }
@@ -413,7 +403,7 @@ fn counted(skin: &Skin, random: bool, side: f64) -> [f64; 6] {
         n,
         100.0 * relative,
         variance,
-        if random { f64::NAN } else { nanoseconds },
+        if random { f64::NAN } else { 1e9 * seconds / count as f64 },
     ]
 }
 
