@@ -1,19 +1,15 @@
 //! Error of opacity shadow maps on hair from a file (USD, MCAP, PLY, .hair), against the mean of exact rays over the same
 //! footprint, and the time they take.
 //!
-//! `cargo run --release -p pelage --example shadow_error -- FILE [FRAME [WIDTH [PLOT]]]`; hair without widths is WIDTH thick
-//! (in the file's units; a 2000th of its size by default) and opaque. With PLOT (0 for WIDTH: the default), many settings are
-//! tried, and PLOT.csv and PLOT.svg written: error against seconds.
+//! `cargo run --release -p pelage --example shadow_error -- FILE [FRAME [WIDTH]]`; hair without widths is WIDTH thick (in the
+//! file's units; a 2000th of its size by default) and opaque. `pelage bench --study shadow` tries many settings on the
+//! sample shots.
 #![allow(missing_docs, clippy::disallowed_methods)]
-
-#[path = "../src/bench/plot.rs"]
-mod plot;
 
 use pelage::curves;
 use pelage_geom::{Vec3, rng};
 use pelage_light::shadow::{
-    Footprint, Interpolation, Placement, Quality, ShadowError, ShadowHair, ShadowSettings, Source, transmittance,
-    transmittance_exact,
+    Footprint, Placement, Quality, ShadowError, ShadowHair, ShadowSettings, Source, transmittance, transmittance_exact,
 };
 use std::path::Path;
 use std::time::Instant;
@@ -67,9 +63,6 @@ fn main() {
     };
     let default = Quality::Default.settings();
     let of = |texels: usize, slices: usize| ShadowSettings { texels, slices, ..default };
-    if let Some(name) = arguments.get(3) {
-        return sweep(name, &measure);
-    }
     for (name, settings) in [
         ("draft", Quality::Draft.settings()),
         ("default", default),
@@ -122,46 +115,4 @@ impl Found {
         } = self;
         format!("{texels:4} x {slices:3}: RMS {rms:.4}  95 % {p95:.4}  bias {bias:+.4}  {seconds:.2} s  {mb} MB")
     }
-}
-
-/// Error and cost of resolution x slices, and of filter, interpolation and placement at the default of the others.
-fn sweep(name: &str, measure: &dyn Fn(&ShadowSettings) -> Found) {
-    let default = Quality::Default.settings();
-    let mut csv = String::from("texels,slices,placement,filter,interpolation,rms,p95,bias,seconds,megabytes\n");
-    let mut lines: Vec<plot::Series> = Vec::new();
-    let mut add = |label: String, all: Vec<ShadowSettings>, line: bool| {
-        let found: Vec<Found> = all.iter().map(measure).collect();
-        for f in &found {
-            let (s, e) = (f.settings, &f.error);
-            csv += &format!(
-                "{},{},{:?},{:.6},{:?},{:.4},{:.4},{:+.4},{:.2},{}\n",
-                s.texels, s.slices, s.placement, s.filter, s.interpolation, e.rms, e.p95, e.bias, f.seconds, f.mb
-            );
-            println!("{label}: {}", f.line());
-        }
-        if line {
-            let points: Vec<[f64; 2]> = found.iter().map(|f| [f.seconds, f.error.rms]).collect();
-            let mark = found.iter().position(|f| f.settings == default).map(|k| points[k]);
-            lines.push(plot::Series { mark, ..plot::Series::new(label, points) });
-        }
-    };
-    const SLICES: [usize; 6] = [16, 32, 64, 128, 256, 384];
-    let slices = |texels: usize, placement| {
-        SLICES.map(|slices| ShadowSettings { texels, slices, placement, ..default }).to_vec()
-    };
-    for texels in [512, 1024, 2048, 4096] {
-        add(format!("{texels} texels"), slices(texels, Placement::Histogram), true);
-    }
-    add("2048, even slices".into(), slices(2048, Placement::Uniform), true);
-    for interpolation in [Interpolation::Transmittance, Interpolation::Cubic] {
-        add(format!("{interpolation:?}"), vec![ShadowSettings { interpolation, ..default }], false);
-    }
-    for factor in [0.5, 0.75, 1.25, 1.5] {
-        add(format!("filter x {factor}"), vec![ShadowSettings { filter: default.filter * factor, ..default }], false);
-    }
-    let title = "Shadow maps: error against time, 16 to 384 slices";
-    let axes = ["seconds on two threads", "RMS error of transmittance"];
-    let svg = plot::Plot { title, axes, log: [true, true], series: lines }.svg();
-    std::fs::write(format!("{name}.svg"), svg).expect("a file");
-    std::fs::write(format!("{name}.csv"), csv).expect("a file");
 }

@@ -1,10 +1,12 @@
 //! Samples that Pelage makes itself: skins, motions, maps and grooms by formula, always the same bytes.
 
+use crate::Error;
 use crate::cli::Sample;
 use crate::format::image::png_bytes;
 use crate::format::ply::mesh_bytes;
 use pelage_geom::shapes;
 use pelage_geom::{Map, Mesh, RigidMotion, Vec3};
+use std::path::Path;
 
 /// A file by its path in the shot folder.
 pub type NamedFile = (String, Vec<u8>);
@@ -19,6 +21,17 @@ pub fn files(kind: Sample) -> Vec<NamedFile> {
         Sample::BustNod => bust(true),
         Sample::Animal => animal(),
     }
+}
+
+/// Writes files of a shot into its folder.
+pub fn write(dir: &Path, files: &[NamedFile]) -> Result<(), Error> {
+    for (name, bytes) in files {
+        let path = dir.join(name);
+        let folder = path.parent().expect("inside the folder");
+        std::fs::create_dir_all(folder).map_err(Error::disk(folder))?;
+        std::fs::write(&path, bytes).map_err(Error::disk(&path))?;
+    }
+    Ok(())
 }
 
 fn text(name: &str, content: &str) -> NamedFile {

@@ -51,6 +51,15 @@ pub(super) fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Sen
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads").install(work)
 }
 
+/// What some work on a single thread gives, and its processor seconds.
+pub(super) fn alone<T: Send>(work: impl FnOnce() -> T + Send) -> (T, f64) {
+    on_threads(1, || {
+        let start = thread_seconds();
+        let done = work();
+        (done, thread_seconds() - start)
+    })
+}
+
 /// Processor seconds of this thread: the machine may be shared. Seconds on the clock where the system does not tell.
 pub(super) fn thread_seconds() -> f64 {
     // Giving way brings the figure up to date.

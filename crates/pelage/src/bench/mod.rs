@@ -4,10 +4,16 @@
 //! measured together, such as an error and the seconds that it cost. Points are kept in `points.jsonl` as soon as they are
 //! measured, so that a bench that was ended goes on where it was, and each can be measured alone.
 
+mod collision;
+mod guides;
+mod instancing;
+mod lod;
 mod machine;
 mod plot;
 mod report;
 mod scaling;
+mod shadow;
+mod shots;
 mod skips;
 
 use crate::Error;
@@ -29,7 +35,7 @@ pub struct Study {
 }
 
 /// All studies in the order of the report.
-pub const STUDIES: [Study; 2] = [skips::STUDY, scaling::STUDY];
+pub const STUDIES: [Study; 7] = [guides::STUDY, collision::STUDY, shadow::STUDY, instancing::STUDY, lod::STUDY, skips::STUDY, scaling::STUDY];
 
 /// What a study found.
 #[derive(Debug, Default)]
@@ -123,8 +129,7 @@ impl<'a> Bench<'a> {
         if !ours && !before.is_empty() {
             progress.say(&format!("note: {} is of another program or machine: measured anew", path.display()));
         }
-        let kept: BTreeMap<String, Vec<f64>> =
-            before.lines().skip(1).filter(|_| ours).filter_map(|l| parse(l)).collect();
+        let kept: BTreeMap<String, Vec<f64>> = before.lines().skip(1).filter(|_| ours).filter_map(parse).collect();
         // Written anew: the last line may have been cut.
         let mut file = File::create(&path).map_err(Error::disk(&path))?;
         let lines: String = kept.iter().map(|(name, values)| line(name, values)).collect();

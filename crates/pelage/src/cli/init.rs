@@ -27,12 +27,7 @@ pub fn init(dir: &Path, skin: Option<&Path>, meters_per_unit: f64, kind: Sample)
             sample::around(bytes, &mesh, meters_per_unit)
         }
     };
-    for (name, bytes) in &files {
-        let path = dir.join(name);
-        let folder = path.parent().expect("inside the folder");
-        std::fs::create_dir_all(folder).map_err(Error::disk(folder))?;
-        std::fs::write(&path, bytes).map_err(Error::disk(&path))?;
-    }
+    sample::write(dir, &files)?;
     print(&format!("made {} files in {d}\nnext: cd {d} && pelage run\n", files.len(), d = dir.display()));
     Ok(true)
 }
