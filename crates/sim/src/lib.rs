@@ -14,6 +14,8 @@ mod hinge;
 pub mod integrate;
 pub mod lanes;
 pub mod nine_steps;
+pub mod reference;
+pub mod rig;
 pub mod rod;
 mod scene;
 pub mod settings;

@@ -1,10 +1,10 @@
 //! One hair against references: released, at rest, and at different tolerances.
 
-use crate::closed_form::{chain, elastica, spectral};
-use crate::common::{GRAVITY, Shot};
 use crate::plot::{Plot, Series};
 use crate::{Write, cpu_seconds, on_threads};
 use nalgebra::{DMatrix, DVector};
+use pelage_sim::reference::{chain, elastica, spectral};
+use pelage_sim::rig::{GRAVITY, Rig};
 use pelage_sim::{Material, Model, Settings};
 use std::f64::consts::FRAC_PI_4;
 
@@ -48,11 +48,11 @@ fn run(model: Model, segments: usize, substeps: Option<u32>, tolerance: f64) -> 
     let hairs = vec![straight(length, segments); 8];
     let mut best = Run { tips: [[0.0; 2]; 3], seconds: f64::INFINITY, solves: 0.0 };
     for _ in 0..if model == Model::Rod { 3 } else { 1 } {
-        let mut shot = Shot::new(&hairs, &settings, GRAVITY);
+        let mut shot = Rig::under(&hairs, &settings, GRAVITY).unwrap();
         let (mut seconds, mut steps, mut solves) = (0.0, 0, 0);
         for k in 0..3 {
             let start = cpu_seconds();
-            shot.wait((length / 9.81).sqrt());
+            shot.wait((length / 9.81).sqrt()).unwrap();
             seconds += cpu_seconds() - start;
             let tip = shot.tip(0);
             best.tips[k] = [tip.x / length, tip.y / length];
@@ -171,9 +171,9 @@ fn rested(gamma: f64, segments: usize) -> ([f64; 2], f64) {
         tolerance: 1e-9,
         ..Settings::default()
     };
-    let mut shot = Shot::new(&[straight(length, segments)], &settings, GRAVITY);
+    let mut shot = Rig::under(&[straight(length, segments)], &settings, GRAVITY).unwrap();
     for _ in 0..60 {
-        shot.wait(0.25);
+        shot.wait(0.25).unwrap();
     }
     let speed = shot.sim.velocities().iter().map(|v| libm::hypot(v[0], v[1])).fold(0.0, f64::max);
     let tip = shot.tip(0) / length;

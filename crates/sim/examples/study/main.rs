@@ -5,10 +5,6 @@
 #![allow(missing_docs, clippy::disallowed_methods, clippy::needless_range_loop)]
 
 mod accuracy;
-#[path = "../../tests/closed_form/mod.rs"]
-mod closed_form;
-#[path = "../../tests/common/mod.rs"]
-mod common;
 mod pictures;
 #[path = "../../../pelage/src/bench/plot.rs"]
 mod plot;

@@ -1,9 +1,9 @@
 //! Hair on a ball: the change from a step to half of it, and how long many hairs take.
 
-use crate::common::{GRAVITY, Shot, Vec3, ball, tuft, turned};
 use crate::plot::{Plot, Series};
 use crate::{Write, on_threads};
-use pelage_sim::{Body, Field, Part, Rigid, Settings, Shape};
+use pelage_sim::rig::{GRAVITY, Rig, ball, tuft, turned};
+use pelage_sim::{Body, Field, Part, Rigid, Settings, Shape, Vec3};
 use std::f64::consts::TAU;
 use std::time::Instant;
 
@@ -15,16 +15,16 @@ fn shake(frame: usize, f: f64) -> Rigid {
     turned(Vec3::new(0.2, 1.0, 0.0), libm::sin(TAU * (frame as f64 + f) / FPS))
 }
 
-fn advance(shot: &mut Shot, frame: usize, field: Option<&Field>) {
+fn advance(shot: &mut Rig, frame: usize, field: Option<&Field>) {
     let motion = move |f: f64| shake(frame, f);
     let parts = field.iter().map(|f| Part { motion: &motion, shape: Shape::Field(f), exact: None }).collect();
-    shot.go(1.0 / FPS, &motion, &Body { parts, seconds: 1.0 / FPS }, None);
+    shot.go(1.0 / FPS, &motion, &Body { parts, seconds: 1.0 / FPS }, None).unwrap();
 }
 
 /// Points of all frames.
 fn play(hairs: &[Vec<[f64; 3]>], substeps: u32, field: Option<&Field>) -> (Vec<Vec<[f64; 3]>>, f64, u64) {
     let settings = Settings { substeps: Some(substeps), ..Settings::default() };
-    let mut shot = Shot::new(hairs, &settings, GRAVITY);
+    let mut shot = Rig::under(hairs, &settings, GRAVITY).unwrap();
     let start = Instant::now();
     let mut own = 0;
     let frames = (0..24)
@@ -117,7 +117,7 @@ pub fn many() {
     on_threads(2, || {
         for solid in [true, false] {
             let start = Instant::now();
-            let mut shot = Shot::new(&hairs, &Settings::default(), GRAVITY);
+            let mut shot = Rig::under(&hairs, &Settings::default(), GRAVITY).unwrap();
             println!("# {count} hairs x 50 segments, body {solid}: prepared in {:.2} s", start.elapsed().as_secs_f64());
             println!(
                 "frame,seconds,processor_seconds,steps,solves_per_step,subdivided,ns_per_node_and_step,held,peak_MB"

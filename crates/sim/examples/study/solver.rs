@@ -1,11 +1,11 @@
 //! What a linear solve costs: counted operations, and conjugate gradients on the same systems.
 
-use crate::common::{GRAVITY, Shot};
 use crate::{cpu_seconds, on_threads};
 use pelage_sim::End;
 use pelage_sim::band::{self, Column, HELD, Panel, RING, Window};
 use pelage_sim::group::Strand;
 use pelage_sim::lanes::{self, Kernel, LANES, Lanes, Pack, Width};
+use pelage_sim::rig::{GRAVITY, Rig};
 use pelage_sim::rod::{self, Damping, Scratch};
 use pelage_sim::springs::calibrate::{Section, calibrate};
 use pelage_sim::springs::layout::zigzag;
@@ -403,11 +403,11 @@ fn strands_in_motion(hairs: usize, wide: bool) {
     let one: Vec<[f64; 3]> = strands()[1].point.iter().map(|p| [p.x, p.y, p.z]).collect();
     let material = Material { drag_factor: 0.0, ..Material::default() };
     let settings = Settings { material, sag_free: false, sleep: false, wide, ..Settings::default() };
-    let mut shot = Shot::new(&vec![one; hairs], &settings, GRAVITY);
+    let mut shot = Rig::under(&vec![one; hairs], &settings, GRAVITY).unwrap();
     let (mut t, mut steps, mut solves) = (0.0, 0, 0);
     for _ in 0..12 {
         let start = cpu_seconds();
-        shot.wait(1.0 / 24.0);
+        shot.wait(1.0 / 24.0).unwrap();
         t += (cpu_seconds() - start) * 1e9;
         steps += shot.last.particle_steps;
         solves += shot.last.particle_solves;
