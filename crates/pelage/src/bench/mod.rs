@@ -5,9 +5,12 @@
 //! measured, so that a bench that was ended goes on where it was, and each can be measured alone.
 
 mod machine;
+mod papers;
 mod plot;
 mod report;
 mod scaling;
+mod shot;
+mod strand;
 
 use crate::Error;
 use crate::progress::Progress;
@@ -28,7 +31,7 @@ pub struct Study {
 }
 
 /// All studies in the order of the report.
-pub const STUDIES: [Study; 1] = [scaling::STUDY];
+pub const STUDIES: [Study; 4] = [strand::STUDY, shot::STUDY, papers::STUDY, scaling::STUDY];
 
 /// What a study found.
 #[derive(Debug, Default)]

@@ -1,12 +1,12 @@
-//! Drawings of single hairs (Selle, Lentine, Fedkiw 2008, Figures 10 and 11 show such tests).
+//! Drawings of single hairs (Selle, Lentine, Fedkiw 2008, Figures 10 and 11 show such tests), as SVG files.
+//!
+//! `cargo run --release -p pelage-sim --example hair_pictures -- [FOLDER]`; the folder is `docs/pictures` if none is given.
+#![allow(missing_docs, clippy::disallowed_methods)]
 
-use crate::Write;
-use pelage_sim::rig::{Rig, still};
+use pelage_sim::rig::{FRAME, Rig, still};
 use pelage_sim::{Body, End, Material, Root, Settings, Span};
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
-
-const FRAME: f64 = 1.0 / 24.0;
 
 /// A wavy or curly hair along `x`: a helix around its axis, `radius` and `pitch` in metres; 12 cm along the axis.
 fn helix(radius: f64, pitch: f64, direction: [f64; 2]) -> Vec<[f64; 3]> {
@@ -32,7 +32,7 @@ fn flat(shot: &Rig) -> Vec<[f64; 2]> {
 }
 
 /// A straight hair whose clamped tip is pushed towards the root and turned about its axis.
-fn looped(write: Write) {
+fn looped(write: Write<'_>) {
     let length = 0.1;
     let points: Vec<[f64; 3]> = (0..=60).map(|i| [length * f64::from(i) / 60.0, 0.0, 0.0]).collect();
     let own = Settings { tip: End::Clamped, ..settings(1.0) };
@@ -73,7 +73,17 @@ fn looped(write: Write) {
     );
 }
 
-pub fn draw(write: Write) {
+/// Writes an SVG file's text under a name.
+type Write<'a> = &'a dyn Fn(&str, String);
+
+fn main() {
+    let folder = std::env::args().nth(1).unwrap_or_else(|| "docs/pictures".to_string());
+    draw(&|name, text| {
+        std::fs::write(format!("{folder}/{name}.svg"), text).expect("the folder should exist");
+    });
+}
+
+fn draw(write: Write<'_>) {
     looped(write);
     let hang = [0.0, -1.0];
     // Under changing gravity: pulled straight, then let go.
