@@ -216,7 +216,7 @@ fn introduction() -> Section {
             "Processor seconds on one thread, all hairs of the point together, divided by hairs and frames. To be seen: without \
              a body everything falls with the step; on the ball, contact rules, and more steps, segments or a smaller tolerance \
              buy less than they cost. Rings mark the default step. Where the paper's nine steps are off by half a length, they \
-             did not hold the hair at all, not even at rest.",
+             did not hold the hair: as printed they are for slow motion.",
         )
 }
 
