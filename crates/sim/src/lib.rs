@@ -15,6 +15,8 @@ pub mod integrate;
 pub mod lanes;
 pub mod nine_steps;
 mod place;
+pub mod reference;
+pub mod rig;
 pub mod rod;
 mod scene;
 pub mod settings;

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{GRAVITY, Shot, Vec3, ball, tuft, turned};
+use common::{GRAVITY, Rig, Vec3, ball, tuft, turned};
 use pelage_geom::shapes;
 use pelage_sim::{Body, Ellipsoid, End, Exact, Material, Part, Settings, Shape};
 
@@ -12,7 +12,7 @@ fn hair_on_a_shaking_ball_stays_outside() {
     let b = ball(radius);
     let hairs = tuft(radius, 64, 0.2, 41);
     for (speed, friction) in [(1.0, 0.0), (1.0, 0.3), (10.0, 0.3)] {
-        let mut shot = Shot::new(&hairs, &Settings { friction, ..Settings::default() }, GRAVITY);
+        let mut shot = Rig::under(&hairs, &Settings { friction, ..Settings::default() }, GRAVITY).unwrap();
         for frame in 0..12 {
             let angle = |f: f64| 1.0 * libm::sin(speed * 2.0 * std::f64::consts::PI * 1.0 * (frame as f64 + f) / 24.0);
             let motion = move |f: f64| turned(Vec3::new(0.2, 1.0, 0.0), angle(f));
@@ -24,7 +24,7 @@ fn hair_on_a_shaking_ball_stays_outside() {
                 }],
                 seconds: 1.0 / 24.0,
             };
-            shot.go(1.0 / 24.0, &motion, &body, None);
+            shot.go(1.0 / 24.0, &motion, &body, None).unwrap();
             let at = body.at(1.0);
             let mut deepest = 0.0f64;
             for h in 0..hairs.len() {
@@ -48,11 +48,11 @@ fn hair_in_contact_moves_as_if_it_were_alone() {
         .map(|k| tuft(radius, 11, 0.05 + 0.015 * f64::from(k), 12 + 2 * k as usize)[k as usize].clone())
         .collect();
     let play = |hairs: &[Vec<[f64; 3]>], wide: bool| {
-        let mut shot = Shot::new(hairs, &Settings { wide, ..Settings::default() }, GRAVITY);
+        let mut shot = Rig::under(hairs, &Settings { wide, ..Settings::default() }, GRAVITY).unwrap();
         for frame in 0..6 {
             let motion = move |f: f64| turned(Vec3::new(0.2, 1.0, 0.0), libm::sin(0.8 * (f64::from(frame) + f)));
             let part = Part { motion: &motion, shape: Shape::Field(&b.field), exact: None };
-            shot.go(1.0 / 24.0, &motion, &Body { parts: vec![part], seconds: 1.0 / 24.0 }, None);
+            shot.go(1.0 / 24.0, &motion, &Body { parts: vec![part], seconds: 1.0 / 24.0 }, None).unwrap();
         }
         shot
     };
@@ -117,7 +117,7 @@ fn a_string_slips_over_a_drum_where_the_capstan_says() {
             sleep: false,
             ..Settings::default()
         };
-        let mut shot = Shot::new(std::slice::from_ref(&hair), &settings, GRAVITY);
+        let mut shot = Rig::under(std::slice::from_ref(&hair), &settings, GRAVITY).unwrap();
         let body = Body {
             parts: vec![Part { motion: &common::still, shape: Shape::Ellipsoid(&e), exact: None }],
             seconds: 1.0 / 24.0,
@@ -125,11 +125,11 @@ fn a_string_slips_over_a_drum_where_the_capstan_says() {
         // Gravity comes slowly: a string that is dropped bounces, and slips early.
         for k in 1..=12 {
             shot.gravity = GRAVITY.map(|g| g * (f64::from(k) / 10.0).min(1.0));
-            shot.go(1.0 / 24.0, &common::still, &body, None);
+            shot.go(1.0 / 24.0, &common::still, &body, None).unwrap();
         }
         let start = shot.tip(0).y;
         for _ in 0..6 {
-            shot.go(1.0 / 24.0, &common::still, &body, None);
+            shot.go(1.0 / 24.0, &common::still, &body, None).unwrap();
         }
         let fell = start - shot.tip(0).y;
         println!(

@@ -1,10 +1,9 @@
 //! Strands in motion against closed forms: frequencies, pendulums, chains, and a rod released from rest.
 
-mod closed_form;
 mod common;
 
-use closed_form::{chain, vibration};
-use common::{G, GRAVITY, MODELS, Shot, Vec3, bending_time, plain, rod, straight};
+use common::{G, GRAVITY, MODELS, Rig, Vec3, bending_time, plain, rod, straight};
+use pelage_sim::reference::{chain, vibration};
 use pelage_sim::{End, Material, Model, Settings};
 use std::f64::consts::PI;
 
@@ -30,14 +29,14 @@ fn first_three(model: Model, gamma: f64, n: usize, planes: [Vec3; 2]) -> [[f64; 
         // The higher the oscillation, the smaller its step.
         let dt = 2.0 * PI / exact[mode] / 48.0;
         let count = (periods * 48.0) as usize;
-        let mut shot = Shot::new(&[straight(n, -Vec3::y())], &plain(model, material), down.into());
+        let mut shot = Rig::under(&[straight(n, -Vec3::y())], &plain(model, material), down.into()).unwrap();
         // A blow from the side moves all oscillations of both planes.
         shot.gravity = (down + (planes[0] + planes[1]) * (0.01 / dt)).into();
-        shot.wait(1e-2 * dt * unit);
+        shot.wait(1e-2 * dt * unit).unwrap();
         shot.gravity = down.into();
         let mut signal = [Vec::new(), Vec::new()];
         for _ in 0..count {
-            shot.wait(dt * unit);
+            shot.wait(dt * unit).unwrap();
             let p = shot.hair(0);
             for (s, plane) in signal.iter_mut().zip(&planes) {
                 s.push(p.windows(2).zip(&weigh[mode]).map(|(w, f)| (w[1] - w[0]).dot(plane) * f).sum());
@@ -105,11 +104,11 @@ fn a_bob_on_a_thread_is_a_pendulum() {
             let direction = Vec3::new(libm::sin(angle), -libm::cos(angle), 0.0);
             // As stiff against stretching as 20 cm of hair.
             let settings = Settings { root: End::Pinned, ..plain(model, rod(10.0)) };
-            let mut shot = Shot::new(&[straight(1, direction)], &settings, GRAVITY);
+            let mut shot = Rig::under(&[straight(1, direction)], &settings, GRAVITY).unwrap();
             let dt = 2.0 * PI * (1.0 / G).sqrt() * vibration::pendulum_period(angle) / 200.0;
             let swing: Vec<f64> = (0..700)
                 .map(|_| {
-                    shot.wait(dt);
+                    shot.wait(dt).unwrap();
                     shot.tip(0).x
                 })
                 .collect();
@@ -140,15 +139,15 @@ fn a_chain_of_beads_swings_as_bernoulli_says() {
         // Rolling freely about their axis, springs take up a blow of the higher ones.
         for mode in 0..if model == Model::Rod { 3 } else { 1 } {
             let settings = Settings { root: End::Pinned, ..plain(model, material) };
-            let mut shot = Shot::new(&[straight(n, -Vec3::y())], &settings, GRAVITY);
+            let mut shot = Rig::under(&[straight(n, -Vec3::y())], &settings, GRAVITY).unwrap();
             let unit = (1.0 / G).sqrt();
             let dt = 2.0 * PI / exact[mode] / 60.0;
             shot.gravity[0] = 0.1 / dt;
-            shot.wait(1e-2 * dt * unit);
+            shot.wait(1e-2 * dt * unit).unwrap();
             shot.gravity = GRAVITY;
             let swing: Vec<f64> = (0..240)
                 .map(|_| {
-                    shot.wait(dt * unit);
+                    shot.wait(dt * unit).unwrap();
                     let p = shot.hair(0);
                     p.windows(2).zip(&weigh[mode]).map(|(w, f)| (w[1] - w[0]).x * f).sum()
                 })
@@ -168,9 +167,9 @@ fn released(model: Model, n: usize, steps: u32) -> [[f64; 2]; 3] {
 /// As [`released`], for any Gamma.
 fn released_at(gamma: f64, model: Model, n: usize, steps: u32) -> [[f64; 2]; 3] {
     let settings = Settings { substeps: Some(steps), ..plain(model, rod(gamma)) };
-    let mut shot = Shot::new(&[straight(n, Vec3::x())], &settings, GRAVITY);
+    let mut shot = Rig::under(&[straight(n, Vec3::x())], &settings, GRAVITY).unwrap();
     std::array::from_fn(|_| {
-        shot.wait((1.0 / G).sqrt());
+        shot.wait((1.0 / G).sqrt()).unwrap();
         let tip = shot.tip(0);
         [tip.x, tip.y]
     })
@@ -183,7 +182,7 @@ fn apart(a: &[[f64; 2]; 3], b: &[[f64; 2]; 3]) -> f64 {
 
 #[test]
 fn a_released_rod_swings_as_it_should() {
-    // Computed by two methods in closed_form/main.rs, and by an outside one.
+    // Computed by two methods in closed_form.rs, and by an outside one.
     let exact = [[0.75925, -0.60856], [0.01737, -0.84883], [0.73612, -0.63801]];
     let outside = [[0.75934, -0.60859], [0.01636, -0.84852], [0.73460, -0.63972]];
     for model in MODELS {
@@ -234,14 +233,15 @@ fn internal_damping_takes_what_it_should() {
         for zeta in [0.02, 0.2] {
             let damping = 2.0 * zeta / omega * unit;
             let mut shot =
-                Shot::new(&[straight(n, Vec3::x())], &plain(model, Material { damping, ..rod(1.0) }), [0.0; 3]);
+                Rig::under(&[straight(n, Vec3::x())], &plain(model, Material { damping, ..rod(1.0) }), [0.0; 3])
+                    .unwrap();
             let dt = 2.0 * PI / omega / 100.0;
             shot.gravity[1] = 0.1 / dt;
-            shot.wait(1e-3 * dt * unit);
+            shot.wait(1e-3 * dt * unit).unwrap();
             shot.gravity = [0.0; 3];
             let swing: Vec<f64> = (0..260)
                 .map(|_| {
-                    shot.wait(dt * unit);
+                    shot.wait(dt * unit).unwrap();
                     shot.hair(0).windows(2).zip(weigh).map(|(w, f)| (w[1] - w[0]).y * f).sum()
                 })
                 .collect();

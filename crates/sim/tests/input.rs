@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{GRAVITY, Shot, placed};
+use common::{GRAVITY, Rig, placed};
 use pelage_geom::Offsets;
 use pelage_sim::{Body, Hairs, Material, Root, Settings, SimError, Simulation, Span};
 
@@ -48,16 +48,16 @@ fn nothing_to_do_and_stopping() {
     assert!(sim.advance(&span(&[]), &|_| true).is_ok());
     // Stopped, and put back where it was.
     let hairs = tuft();
-    let mut shot = Shot::new(&hairs, &Settings::default(), GRAVITY);
+    let mut shot = Rig::under(&hairs, &Settings::default(), GRAVITY).unwrap();
     shot.gravity = [3.0, -9.81, 0.0];
-    shot.wait(FRAME);
+    shot.wait(FRAME).unwrap();
     let saved = shot.sim.save();
     let mut other = shot.clone();
     let roots: &'static [Root] = Box::leak(shot.roots.clone().into_boxed_slice());
     assert_eq!(shot.sim.advance(&span(roots), &|_| false), Err(SimError::Stopped));
     shot.sim.restore(&saved).unwrap();
-    shot.wait(FRAME);
-    other.wait(FRAME);
+    shot.wait(FRAME).unwrap();
+    other.wait(FRAME).unwrap();
     assert_eq!(shot.sim.save(), other.sim.save());
     let _ = placed([0.0; 3]);
 }

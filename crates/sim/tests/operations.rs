@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::{GRAVITY, Shot, Vec3, ball, tuft, turned};
+use common::{GRAVITY, Rig, Vec3, ball, tuft, turned};
 use pelage_sim::{Body, Model, Part, Settings, Shape};
 
 /// A count may be this part away from what it was. More work wants a reason; less is written down here too.
@@ -16,12 +16,12 @@ fn a_nodding_ball_of_hair_takes_as_many_steps_and_solves() {
     let body = ball(0.1);
     let count = |model: Model| {
         let settings = Settings { model, ..Settings::default() };
-        let mut shot = Shot::new(&tuft(0.1, 40, 0.12, 20), &settings, GRAVITY);
+        let mut shot = Rig::under(&tuft(0.1, 40, 0.12, 20), &settings, GRAVITY).unwrap();
         let mut found = [0, 0];
         for frame in 0..12 {
             let nod = move |f: f64| turned(Vec3::x(), 0.4 * libm::sin(0.4 * (f64::from(frame) + f)));
             let part = Part { motion: &nod, shape: Shape::Field(&body.field), exact: None };
-            shot.go(1.0 / 24.0, &nod, &Body { parts: vec![part], seconds: 1.0 / 24.0 }, None);
+            shot.go(1.0 / 24.0, &nod, &Body { parts: vec![part], seconds: 1.0 / 24.0 }, None).unwrap();
             found[0] += shot.last.particle_steps;
             found[1] += shot.last.particle_solves;
         }

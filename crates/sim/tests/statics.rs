@@ -1,13 +1,13 @@
 //! Strands at rest against closed forms: cantilevers, curls, chains, and where straight or round shapes buckle.
 
-mod closed_form;
 mod common;
 
-use closed_form::elastica::{self, Load};
-use closed_form::{cable, formula, helix};
 use common::{
-    G, GRAVITY, MODELS, Shot, Vec3, bending_time, links, placed, placed_turned, plain, rod, straight, turned,
+    G, GRAVITY, MODELS, Rig, Vec3, bending_time, come_to_rest, links, placed, placed_turned, plain, rod, straight,
+    turned,
 };
+use pelage_sim::reference::elastica::{self, Load};
+use pelage_sim::reference::{cable, formula, helix};
 use pelage_sim::{End, Material, Model, Root, Settings};
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -23,8 +23,8 @@ fn cantilever(model: Model, gamma: f64, n: usize) -> (f64, f64, f64) {
         // Triangles must be rigid against hinges (EA l^2 >> EI), or the error grows again with finer segments.
         settings.material.stretch_factor = 100.0;
     }
-    let mut shot = Shot::new(&[straight(n, Vec3::x())], &settings, GRAVITY);
-    shot.come_to_rest();
+    let mut shot = Rig::under(&[straight(n, Vec3::x())], &settings, GRAVITY).unwrap();
+    come_to_rest(&mut shot);
     let p = shot.hair(0);
     let tip = p[n];
     // Springs bend in two planes a little differently, in turns: large hinges twist them.
@@ -117,8 +117,8 @@ fn clamps_of_any_direction_and_natural_curls() {
             }
             let l = 1.0 / n as f64;
             let natural: Vec<f64> = (0..n).map(|i| -(clamp + curvature * (i as f64 + 0.5) * l)).collect();
-            let mut shot = Shot::new(&[links(&natural)], &calm(model, gamma), GRAVITY);
-            shot.come_to_rest();
+            let mut shot = Rig::under(&[links(&natural)], &calm(model, gamma), GRAVITY).unwrap();
+            come_to_rest(&mut shot);
             let tip = shot.tip(0);
             let load = Load { gamma, clamp, curvature, ..Load::default() };
             let (exact, same) = (elastica::continuous(&load, 400), elastica::discrete(&load, n));
@@ -145,8 +145,8 @@ fn a_horizontal_hook_twists_as_castigliano_says() {
             let angle: Vec<f64> = (0..n).map(|i| (i as f64 + 0.5) * step).collect();
             let hook = links(&angle);
             let settings = plain(model, Material { poisson, damping: 0.3, ..rod(gamma) });
-            let mut shot = Shot::new(&[hook], &settings, [0.0, 0.0, -G]);
-            shot.come_to_rest();
+            let mut shot = Rig::under(&[hook], &settings, [0.0, 0.0, -G]).unwrap();
+            come_to_rest(&mut shot);
             let radius: f64 = 2.0 / PI;
             let twisting = (1.0 + poisson) * (PI * PI / 8.0 - FRAC_PI_2 + 0.5);
             let exact = gamma * radius.powi(4) * (0.5 + twisting);
@@ -164,16 +164,16 @@ fn an_end_turned_bends_a_rod_to_an_arc() {
     for model in MODELS {
         // No gravity; the tip is carried to where an end moment alone would hold it.
         let settings = Settings { tip: End::Clamped, ..calm(model, 1.0) };
-        let mut shot = Shot::new(&[straight(n, Vec3::x())], &settings, [0.0; 3]);
+        let mut shot = Rig::under(&[straight(n, Vec3::x())], &settings, [0.0; 3]).unwrap();
         let place = |a: f64| {
             let [x, y] = formula::bent_by_moment(a);
             vec![placed_turned([x, y, 0.0], Vec3::z(), a)]
         };
         for k in 1..=30 {
             let a = PI * f64::from(k) / 30.0;
-            shot.carry(0.02, shot.roots.clone(), Some(place(a)));
+            shot.carry(0.02, shot.roots.clone(), Some(place(a))).unwrap();
         }
-        shot.come_to_rest();
+        come_to_rest(&mut shot);
         let bent = shot.hair(0);
         let far = bent.iter().enumerate().map(|(i, p)| {
             let s = i as f64 / n as f64;
@@ -200,8 +200,8 @@ fn soft_hair_between_two_points_is_a_catenary() {
             // A tent, upside down; length 1, so that the ends are 1 / length apart.
             let lean = libm::acos(1.0 / length);
             let tent: Vec<f64> = (0..n).map(|i| if i < n / 2 { -lean } else { lean }).collect();
-            let mut shot = Shot::new(&[links(&tent)], &settings, GRAVITY);
-            shot.come_to_rest();
+            let mut shot = Rig::under(&[links(&tent)], &settings, GRAVITY).unwrap();
+            come_to_rest(&mut shot);
             let sag = -shot.hair(0).iter().map(|p| p.y).fold(0.0, f64::min) * length;
             let (exact, same) = (cable::catenary(length).sag, cable::discrete(length, n).sag);
             println!("{model:?} length {length}: sag {sag:.5}, catenary {exact:.5}, chain {same:.5}");
@@ -221,8 +221,9 @@ fn a_soft_hair_stretches_under_its_weight() {
         let weight = m.density * area * G;
         let stretch_factor = weight / (2.0 * m.young * area * 0.005);
         let settings = plain(model, Material { stretch_factor, damping: 0.3, ..m });
-        let mut shot = Shot::new(&[straight(40, -Vec3::y())], &Settings { strain_limit: 0.1, ..settings }, GRAVITY);
-        shot.come_to_rest();
+        let mut shot =
+            Rig::under(&[straight(40, -Vec3::y())], &Settings { strain_limit: 0.1, ..settings }, GRAVITY).unwrap();
+        come_to_rest(&mut shot);
         let longer = -shot.tip(0).y - 1.0;
         let exact = formula::stretch_under_weight(weight, 1.0, m.young * area * stretch_factor);
         println!("{model:?}: {longer:.6} for {exact:.6}");
@@ -231,17 +232,17 @@ fn a_soft_hair_stretches_under_its_weight() {
 }
 
 /// Whether a small push sideways grows within `count` steps: the distance to the same hair without the push.
-fn grows(shot: &mut Shot, push: Vec3, count: usize, seconds: f64) -> bool {
+fn grows(shot: &mut Rig, push: Vec3, count: usize, seconds: f64) -> bool {
     let mut calm = shot.clone();
     let gravity = shot.gravity;
     shot.gravity = (Vec3::from(gravity) + push).into();
-    shot.wait(seconds);
+    shot.wait(seconds).unwrap();
     shot.gravity = gravity;
-    calm.wait(seconds);
+    calm.wait(seconds).unwrap();
     let (mut early, mut late) = (0.0f64, 0.0f64);
     for k in 0..count {
-        shot.wait(seconds);
-        calm.wait(seconds);
+        shot.wait(seconds).unwrap();
+        calm.wait(seconds).unwrap();
         let (a, b) = (shot.hair(0), calm.hair(0));
         let away = a.iter().zip(&b).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
         if k < count / 40 {
@@ -262,7 +263,7 @@ fn upright_hair_buckles_at_greenhills_height() {
         for (factor, falls) in [(0.95, false), (1.05, true)] {
             let gamma = formula::self_buckling() * factor;
             let settings = plain(model, Material { damping: 5e-3, ..rod(gamma) });
-            let mut shot = Shot::new(&[straight(50, Vec3::y())], &settings, GRAVITY);
+            let mut shot = Rig::under(&[straight(50, Vec3::y())], &settings, GRAVITY).unwrap();
             assert_eq!(grows(&mut shot, Vec3::new(1e-4, 0.0, 0.7e-4), 600, 0.03), falls, "{model:?} {factor}");
         }
     }
@@ -285,8 +286,8 @@ fn pushed_ends_buckle_at_eulers_loads() {
                 let shorter = factor * load * m.diameter * m.diameter / (16.0 * softer);
                 let m = Material { damping: 1e-2, stretch_factor: softer, ..m };
                 let settings = Settings { root, tip, tolerance: 1e-9, ..plain(model, m) };
-                let mut shot = Shot::new(&[straight(n, Vec3::x())], &settings, [0.0; 3]);
-                shot.carry(0.05, vec![placed([0.0; 3])], Some(vec![placed([1.0 - shorter, 0.0, 0.0])]));
+                let mut shot = Rig::under(&[straight(n, Vec3::x())], &settings, [0.0; 3]).unwrap();
+                shot.carry(0.05, vec![placed([0.0; 3])], Some(vec![placed([1.0 - shorter, 0.0, 0.0])])).unwrap();
                 let push = Vec3::new(0.0, 1e-6, 0.6e-6);
                 let grew = grows(&mut shot, push, 300, 0.03 * bending_time(1.0));
                 assert_eq!(grew, buckles, "{model:?} {root:?} {tip:?} {factor}");
@@ -297,20 +298,20 @@ fn pushed_ends_buckle_at_eulers_loads() {
 
 /// Turns both ends against each other about the x axis, their direction. One end alone would roll a ring along: round
 /// hair has no favourite plane.
-fn twist_ends(shot: &mut Shot, tip: [f64; 3], at_rest: f64, angle: f64) {
+fn twist_ends(shot: &mut Rig, tip: [f64; 3], at_rest: f64, angle: f64) {
     let count = 60;
     for k in 1..=count {
         let half = 0.5 * angle * f64::from(k) / f64::from(count);
         let q = turned(Vec3::x(), half).quaternion() * turned(Vec3::z(), at_rest).quaternion();
         let end = Root { rotation: [q.i, q.j, q.k, q.w], ..placed(tip) };
-        shot.carry(0.01, vec![placed_turned([0.0; 3], Vec3::x(), -half)], Some(vec![end]));
+        shot.carry(0.01, vec![placed_turned([0.0; 3], Vec3::x(), -half)], Some(vec![end])).unwrap();
     }
 }
 
 #[test]
 fn twisted_rods_buckle_at_greenhills_moment() {
     // Clamped at both ends, M L / B = m with tan(m / 2) = m / 2: w = y + i z obeys w'''' + i m w''' = 0.
-    let half = closed_form::root(|x| libm::sin(x) - x * libm::cos(x), 4.0, 4.7);
+    let half = pelage_sim::reference::root(|x| libm::sin(x) - x * libm::cos(x), 4.0, 4.7);
     // Springs stand at 1.05 of the moment: not mended.
     for model in MODELS.into_iter().filter(|m| *m == Model::Rod) {
         for (factor, buckles) in [(0.95, false), (1.05, true)] {
@@ -321,7 +322,7 @@ fn twisted_rods_buckle_at_greenhills_moment() {
                 tolerance: 1e-9,
                 ..plain(model, Material { damping: 1e-4, stretch_factor: 1e-2, ..m })
             };
-            let mut shot = Shot::new(&[straight(60, Vec3::x())], &settings, [0.0; 3]);
+            let mut shot = Rig::under(&[straight(60, Vec3::x())], &settings, [0.0; 3]).unwrap();
             twist_ends(&mut shot, [1.0, 0.0, 0.0], 0.0, angle);
             let grew = grows(&mut shot, Vec3::new(0.0, 1e-6, 0.6e-6), 400, 0.03 * bending_time(1.0));
             assert_eq!(grew, buckles, "{model:?} {factor}");
@@ -338,7 +339,7 @@ fn a_twisted_ring_leaves_its_plane_where_michell_says() {
             let settings =
                 Settings { tip: End::Clamped, tolerance: 1e-9, ..plain(model, Material { damping: 2e-3, ..m }) };
             // A straight rod bent to a ring: every inner hinge by 2 pi / n, the clamps' by half of that.
-            let mut shot = Shot::new(&[straight(n, Vec3::x())], &settings, [0.0; 3]);
+            let mut shot = Rig::under(&[straight(n, Vec3::x())], &settings, [0.0; 3]).unwrap();
             let bent = |a: f64| {
                 let angle: Vec<f64> = (0..n).map(|i| a * (i as f64 + 0.5) / n as f64).collect();
                 links(&angle)[n]
@@ -346,15 +347,15 @@ fn a_twisted_ring_leaves_its_plane_where_michell_says() {
             for k in 1..=100 {
                 let a = 2.0 * PI * f64::from(k) / 100.0;
                 let tip = placed_turned(bent(a), Vec3::z(), a);
-                shot.carry(0.01, shot.roots.clone(), Some(vec![tip]));
+                shot.carry(0.01, shot.roots.clone(), Some(vec![tip])).unwrap();
             }
-            shot.steps(40, 0.05);
+            shot.steps(40, 0.05).unwrap();
             let flat = shot.hair(0);
             let off = flat.iter().map(|p| p.z.abs()).fold(0.0, f64::max);
             assert!(off < 1e-6, "{off}");
             let angle = factor * formula::ring_twist(2, 1.0 / (1.0 + m.poisson));
             twist_ends(&mut shot, bent(2.0 * PI), 2.0 * PI, angle);
-            shot.steps(400, 0.03 * bending_time(1.0));
+            shot.steps(400, 0.03 * bending_time(1.0)).unwrap();
             // The half hinges of the clamps carry three quarters of the shear: beside them the ring leans a little.
             let away = shot.hair(0).iter().zip(&flat).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
             println!("{model:?} {factor}: {away:.1e} from the flat ring");
@@ -388,8 +389,8 @@ fn a_hanging_curl_is_as_long_as_loves_helix() {
             let sin_pitch = |s: f64| helix::helix(c_over_b, slope, force(s)).sin_pitch;
             let m = Material { damping: 0.03, drag_factor: 200.0, stretch_factor, ..rod(gamma) };
             let settings = Settings { tolerance: 1e-5, ..plain(model, m) };
-            let mut shot = Shot::new(&[natural], &settings, GRAVITY);
-            shot.steps(160, 0.02);
+            let mut shot = Rig::under(&[natural], &settings, GRAVITY).unwrap();
+            shot.steps(160, 0.02).unwrap();
             // The clamp holds the first turns at their natural pitch: measured beyond them.
             let p = shot.hair(0);
             let start = 1.0 / turns as f64;

@@ -2,15 +2,15 @@
 
 mod common;
 
-use common::{GRAVITY, Shot, Vec3, plain, rod, straight};
+use common::{GRAVITY, Rig, Vec3, plain, rod, straight};
 use pelage_sim::{Body, Material, Model, Rigid, Settings};
 
 /// Tips of a horizontal rod at 1, 2, 3 sqrt(L / g) after its release.
 fn released(model: Model, segments: usize, steps: u32, gamma: f64, tolerance: f64) -> Vec<Vec3> {
     let settings = Settings { substeps: Some(steps), tolerance, ..plain(model, rod(gamma)) };
-    let mut shot = Shot::new(&[straight(segments, Vec3::x())], &settings, GRAVITY);
+    let mut shot = Rig::under(&[straight(segments, Vec3::x())], &settings, GRAVITY).unwrap();
     let tip = |_| {
-        shot.wait((1.0f64 / common::G).sqrt());
+        shot.wait((1.0f64 / common::G).sqrt()).unwrap();
         shot.tip(0)
     };
     (0..3).map(tip).collect()
@@ -62,8 +62,8 @@ fn a_groomed_pose_stays() {
     ] {
         let points = human(length, direction, curl, 40);
         let settings = Settings { material: without_air(), sleep: false, ..Settings::default() };
-        let mut shot = Shot::new(std::slice::from_ref(&points), &settings, GRAVITY);
-        shot.steps(24, 1.0 / 24.0);
+        let mut shot = Rig::under(std::slice::from_ref(&points), &settings, GRAVITY).unwrap();
+        shot.steps(24, 1.0 / 24.0).unwrap();
         let hair = shot.hair(0);
         let drift = hair.iter().zip(&points).map(|(a, b)| (a - Vec3::from(*b)).norm()).fold(0.0, f64::max);
         assert!(drift < 1e-9 * length, "length {length} direction {direction:?} curl {curl}: {drift} m");
@@ -77,14 +77,14 @@ fn a_violent_shake_stays_bounded_at_every_step() {
     let amplitude = 98.1 / (rate * rate);
     let settings = Settings { material: without_air(), substeps: Some(1), ..Settings::default() };
     for fps in [1667.0, 480.0, 120.0, 24.0, 12.0, 1.0] {
-        let mut shot = Shot::new(&[human(0.2, [0.0, -1.0, 0.0], 0.0, 50)], &settings, GRAVITY);
+        let mut shot = Rig::under(&[human(0.2, [0.0, -1.0, 0.0], 0.0, 50)], &settings, GRAVITY).unwrap();
         for k in 0..(2.0 * fps) as usize {
             let start = k as f64 / fps;
             let motion = move |f: f64| Rigid {
                 translation: [amplitude * libm::sin(rate * (start + f / fps)), 0.0, 0.0],
                 ..Rigid::default()
             };
-            shot.go(1.0 / fps, &motion, &Body::default(), None);
+            shot.go(1.0 / fps, &motion, &Body::default(), None).unwrap();
             let last = &shot.last;
             assert!(last.largest_strain <= 0.01 && last.held.is_empty(), "{fps} steps a second: {last:?}");
         }
@@ -97,8 +97,8 @@ fn the_papers_nine_steps_run_in_a_shot() {
     let level: Vec<[f64; 3]> = (0..=20).map(|i| [0.005 * f64::from(i), 0.0, 0.0]).collect();
     let fall = |model| {
         let settings = Settings { model, sag_free: false, material: common::in_vacuum(), ..Settings::default() };
-        let mut shot = Shot::new(std::slice::from_ref(&level), &settings, GRAVITY);
-        shot.steps(3, 1.0 / 24.0);
+        let mut shot = Rig::under(std::slice::from_ref(&level), &settings, GRAVITY).unwrap();
+        shot.steps(3, 1.0 / 24.0).unwrap();
         assert!(shot.last.held.is_empty());
         shot.tip(0)
     };
@@ -117,10 +117,10 @@ fn the_papers_nine_steps_run_in_a_shot() {
         })
         .collect();
     let settings = Settings { model: Model::Paper, ..Settings::default() };
-    let mut shot = Shot::new(&curls, &settings, GRAVITY);
+    let mut shot = Rig::under(&curls, &settings, GRAVITY).unwrap();
     assert!(shot.started.stiffened.iter().all(|s| s.factor <= 64.0), "{:?}", shot.started.stiffened);
     for _ in 0..12 {
-        shot.wait(1.0 / 24.0);
+        shot.wait(1.0 / 24.0).unwrap();
         for (h, curl) in curls.iter().enumerate() {
             let long = |p: &[Vec3]| p.windows(2).map(|w| (w[1] - w[0]).norm()).sum::<f64>();
             let natural: Vec<Vec3> = curl.iter().map(|p| Vec3::from(*p)).collect();

@@ -9,12 +9,15 @@ mod guides;
 mod instancing;
 mod lod;
 mod machine;
+mod papers;
 mod plot;
 mod report;
 mod scaling;
 mod shadow;
+mod shot;
 mod shots;
 mod skips;
+mod strand;
 
 use crate::Error;
 use crate::progress::Progress;
@@ -35,7 +38,18 @@ pub struct Study {
 }
 
 /// All studies in the order of the report.
-pub const STUDIES: [Study; 7] = [guides::STUDY, collision::STUDY, shadow::STUDY, instancing::STUDY, lod::STUDY, skips::STUDY, scaling::STUDY];
+pub const STUDIES: [Study; 10] = [
+    strand::STUDY,
+    shot::STUDY,
+    guides::STUDY,
+    collision::STUDY,
+    shadow::STUDY,
+    instancing::STUDY,
+    lod::STUDY,
+    skips::STUDY,
+    papers::STUDY,
+    scaling::STUDY,
+];
 
 /// What a study found.
 #[derive(Debug, Default)]

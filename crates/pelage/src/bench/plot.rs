@@ -112,8 +112,8 @@ impl Plot<'_> {
         let _ = writeln!(
             o,
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" font-family=\"sans-serif\" \
-             font-size=\"13\"><rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"white\"/>\
-             <text x=\"{left}\" y=\"26\" font-size=\"15\" font-weight=\"bold\">{}</text>",
+             font-size=\"13\"><title>{0}</title><rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"white\"/>\
+             <text x=\"{left}\" y=\"26\" font-size=\"15\" font-weight=\"bold\">{0}</text>",
             self.title
         );
         for t in &axis[0].ticks {

@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use std::io::Write;
 use std::path::Path;
 
-/// Writes `report.html`, `report.json` and `points.csv`.
+/// Writes `report.html`, `report.json` and `points.csv`, and each plot as a file, `STUDY-TITLE.svg`.
 pub(super) fn write(found: &[(Study, Findings)], folder: &Path, quick: bool) -> Result<(), Error> {
     let facts = machine::facts();
     let files = [
@@ -21,7 +21,21 @@ pub(super) fn write(found: &[(Study, Findings)], folder: &Path, quick: bool) -> 
         let path = folder.join(name);
         write_whole(&path, |f| f.write_all(text.as_bytes())).map_err(Error::disk(&path))?;
     }
+    for (study, findings) in found {
+        for svg in findings.sections.iter().flat_map(|s| &s.plots).filter(|svg| !svg.is_empty()) {
+            let path = folder.join(plot_file(study.name, svg));
+            write_whole(&path, |f| f.write_all(svg.as_bytes())).map_err(Error::disk(&path))?;
+        }
+    }
     Ok(())
+}
+
+/// Name of a plot's file: study and title, words in small letters.
+fn plot_file(study: &str, svg: &str) -> String {
+    let title = svg.split_once("<title>").and_then(|(_, rest)| rest.split_once("</title>")).map_or("", |(t, _)| t);
+    let small = title.to_lowercase();
+    let words: Vec<&str> = small.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty()).collect();
+    format!("{study}-{}.svg", words.join("-"))
 }
 
 fn escaped(text: &str) -> String {

@@ -1,7 +1,8 @@
 //! The cases.
 
-use super::rig::{FRAME, Rig, hair, length, settings, still, tuft, turned};
+use super::rig::{hair, settings, tuft};
 use super::{Case, Measures, inputs, paper};
+use crate::rig::{FRAME, Rig, length, still, turned};
 use crate::{
     Body, Ellipsoid, Exact, Field, FieldSettings, Material, Model, Part, Rigid, Settings, Shape, SimError, Vec3, Wind,
 };
@@ -207,7 +208,7 @@ fn short_steps(model: Model, m: &mut Measures) -> Done {
 
 fn teleport(model: Model, m: &mut Measures) -> Done {
     let mut rig = Rig::new(&tuft(), &settings(model))?;
-    rig.wait(4)?;
+    rig.steps(4, FRAME)?;
     rig.go(FRAME, &|f| ten_metres(f * FRAME), &Body::default(), None)?;
     rig.check(m);
     m.most("strands not carried along", (rig.hairs.len() as u64 - rig.last.teleported.min(5)) as f64, 0.0);
@@ -230,7 +231,7 @@ fn shaken(model: Model, m: &mut Measures, material: Material) -> Done {
             rig.go(FRAME, &move |f| shaken_10g(t + f * FRAME), &Body::default(), None)?;
             rig.check(m);
         }
-        rig.wait(1)?;
+        rig.steps(1, FRAME)?;
         rig.check(m);
         rig.digest(m);
     }
@@ -318,7 +319,7 @@ fn no_length(model: Model, m: &mut Measures) -> Done {
     // Resampled to equal segments, of which there are none.
     let mut rig =
         Rig::new(&[vec![ROOT.into(); 10], tuft()[0].clone()], &Settings { segments: Some(8), ..settings(model) })?;
-    rig.wait(2)?;
+    rig.steps(2, FRAME)?;
     rig.check(m);
     degenerate(
         model,
@@ -363,7 +364,7 @@ fn released(model: Model, m: &mut Measures, natural: &[[f64; 3]], pose: &[[f64; 
     let mut rig = Rig::new(&[natural.to_vec()], &settings)?;
     rig.sim.restore(&Rig::new(&[pose.to_vec()], &settings)?.sim.save())?;
     for _ in 0..48 {
-        rig.wait(1)?;
+        rig.steps(1, FRAME)?;
         rig.check(m);
     }
     let far = rig.hair(0).iter().zip(natural).map(|(a, b)| (a - Vec3::from(*b)).norm()).fold(0.0, f64::max);
@@ -524,10 +525,10 @@ fn gravity(model: Model, m: &mut Measures) -> Done {
     for g in [0.0, 1e-300, 1e-3, 98.1, 1e3, 1e5] {
         for direction in [Vec3::y(), -Vec3::y(), Vec3::new(1.0, 0.3, -0.2)] {
             let mut rig = Rig::under(&tuft(), &settings(model), (direction * g).into())?;
-            rig.wait(3)?;
+            rig.steps(3, FRAME)?;
             rig.check(m);
             rig.gravity = (direction * -g).into();
-            rig.wait(3)?;
+            rig.steps(3, FRAME)?;
             rig.check(m);
             rig.digest(m);
         }

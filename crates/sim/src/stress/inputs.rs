@@ -2,7 +2,8 @@
 
 use super::Measures;
 use super::cases::{Done, ball, on_ball, shaken_10g};
-use super::rig::{FRAME, GRAVITY, Rig, hair, settings, still, tuft, turned};
+use super::rig::{hair, settings, tuft};
+use crate::rig::{FRAME, GRAVITY, Rig, still, turned};
 use crate::{
     Body, Deforming, Ellipsoid, End, Exact, Field, FieldSettings, Hairs, Material, Model, Part, Rigid, Root, Settings,
     Shape, SimError, Simulation, Span, Vec3, Wind, rigid_fit,
@@ -17,8 +18,8 @@ pub fn root_no_number(model: Model, m: &mut Measures) -> Done {
         for turned in [false, true] {
             let mut rig = Rig::new(&tuft(), &settings(model))?;
             let mut same = rig.clone();
-            rig.wait(2)?;
-            same.wait(14)?;
+            rig.steps(2, FRAME)?;
+            same.steps(14, FRAME)?;
             let good = rig.roots.clone();
             let mut broken = good.clone();
             if turned {
@@ -28,12 +29,12 @@ pub fn root_no_number(model: Model, m: &mut Measures) -> Done {
             } else {
                 broken[2].position[1] = bad;
             }
-            rig.carry(broken)?;
+            rig.carry(FRAME, broken, None)?;
             m.most("bad roots not told by their id", f64::from(u8::from(rig.last.bad_roots != [3])), 0.0);
             rig.check(m);
-            rig.carry(good)?;
+            rig.carry(FRAME, good, None)?;
             rig.check(m);
-            rig.wait(10)?;
+            rig.steps(10, FRAME)?;
             rig.check_held(m);
             m.most("bad roots told when all is well", rig.last.bad_roots.len() as f64, 0.0);
             for h in 0..rig.hairs.len() {
@@ -120,10 +121,10 @@ pub fn span_no_number(model: Model, m: &mut Measures) -> Done {
         }
         let (time, gravity) = (rig.time, rig.gravity);
         rig.time = bad;
-        taken += u32::from(!refused(rig.wait(1), "time"));
+        taken += u32::from(!refused(rig.steps(1, FRAME), "time"));
         rig.time = time;
         rig.gravity[0] = bad;
-        taken += u32::from(!refused(rig.wait(1), "gravity"));
+        taken += u32::from(!refused(rig.steps(1, FRAME), "gravity"));
         rig.gravity = gravity;
     }
     m.most("bad spans taken, or refused by another name", f64::from(taken), 0.0);
@@ -276,7 +277,7 @@ fn shaken(rig: &mut Rig, m: &mut Measures, wind: Option<&Wind>) -> Done {
         rig.go(FRAME, &move |f| shaken_10g(t + f * FRAME), &Body::default(), wind)?;
         rig.check(m);
     }
-    rig.wait(1)?;
+    rig.steps(1, FRAME)?;
     rig.check(m);
     rig.digest(m);
     Ok(())

@@ -2,7 +2,8 @@
 
 use super::Measures;
 use super::cases::{Done, ball, on_ball, shaken_10g};
-use super::rig::{FRAME, Rig, length, settings, tuft, turned};
+use super::rig::{settings, tuft};
+use crate::rig::{FRAME, Rig, length, turned};
 use crate::{Body, Model, Settings, Vec3};
 
 /// A strand is given up at twice its length; its limited positions may overshoot by what a last step adds.
@@ -21,7 +22,7 @@ pub fn nine_steps(model: Model, m: &mut Measures) -> Done {
 /// Groomed hair at rest stays so: there is nothing but gravity.
 fn at_rest(model: Model, m: &mut Measures) -> Done {
     let mut rig = Rig::new(&tuft(), &settings(model))?;
-    rig.wait(12)?;
+    rig.steps(12, FRAME)?;
     rig.check(m);
     rig.check_held(m);
     m.most("speed of hair left alone, m/s", rig.fastest(), 0.1);

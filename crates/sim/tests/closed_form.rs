@@ -1,10 +1,7 @@
 //! The closed forms against numbers from independent computations, and against each other.
 
-#[path = "mod.rs"]
-mod closed_form;
-
-use closed_form::elastica::{Load, continuous, discrete};
-use closed_form::{cable, chain, formula, helix, spectral, vibration};
+use pelage_sim::reference::elastica::{Load, continuous, discrete};
+use pelage_sim::reference::{cable, chain, formula, helix, spectral, vibration};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 /// Fails unless `a` is `b` to a relative (absolute below 1) tolerance.

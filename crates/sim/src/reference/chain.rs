@@ -2,7 +2,7 @@
 //! dynamics of a strand, and its small oscillations.
 
 use super::tridiagonal;
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// A rod of length 1, mass 1, weight 1 and bending stiffness 1 / Gamma (time in units of sqrt(L / g)), clamped at the
 /// origin, cut into `n` links. Masses 1/n at inner nodes, half of that at the tip. Hinges of stiffness n / Gamma, twice
@@ -123,6 +123,47 @@ impl Chain {
         for i in 0..q.len() {
             self.angle[i] += dt / 6.0 * (v[i] + 2.0 * (v2[i] + v3[i]) + v4[i]);
             self.rate[i] += dt / 6.0 * (a1[i] + 2.0 * (a2[i] + a3[i]) + a4[i]);
+        }
+    }
+
+    /// One step of SDIRK2 (R. Alexander 1977), with Newton's method to rounding: what an L-stable method with the implicit
+    /// coefficient of the simulation's errs where nothing stretches.
+    pub fn implicit_step(&mut self, dt: f64) {
+        let n = self.angle.len();
+        let h = (1.0 - 0.5f64.sqrt()) * dt;
+        let (mut q0, mut v0) = (self.angle.clone(), self.rate.clone());
+        for second in [false, true] {
+            let mut v = v0.clone();
+            let place = |v: &[f64]| -> Vec<f64> { (0..n).map(|i| q0[i] + h * v[i]).collect() };
+            for _ in 0..12 {
+                let f = |v: &[f64]| -> Vec<f64> {
+                    let a = self.acceleration(&place(v), v);
+                    (0..n).map(|i| v[i] - v0[i] - h * a[i]).collect()
+                };
+                let here = f(&v);
+                let mut jacobian = DMatrix::zeros(n, n);
+                for k in 0..n {
+                    let mut moved = v.clone();
+                    moved[k] += 1e-6;
+                    for (i, there) in f(&moved).into_iter().enumerate() {
+                        jacobian[(i, k)] = (there - here[i]) / 1e-6;
+                    }
+                }
+                let by = jacobian.lu().solve(&DVector::from_vec(here)).expect("regular");
+                v.iter_mut().zip(by.iter()).for_each(|(v, by)| *v -= by);
+                if by.amax() < 1e-9 {
+                    break;
+                }
+            }
+            let (q, a): (Vec<f64>, Vec<f64>) = (place(&v), (0..n).map(|i| (v[i] - v0[i]) / h).collect());
+            if second {
+                (self.angle, self.rate) = (q, v);
+            } else {
+                for i in 0..n {
+                    q0[i] = self.angle[i] + (dt - h) * v[i];
+                    v0[i] = self.rate[i] + (dt - h) * a[i];
+                }
+            }
         }
     }
 

@@ -5,8 +5,8 @@
 //! moments of B / L, and angles in radians. The clamp of the discrete chains: point 0 is held, the hinge there has
 //! twice the stiffness of the others, L is the whole polyline.
 //!
-//! Support for tests: `mod closed_form;` in a test file. Its own tests are in `main.rs` beside it.
-#![allow(dead_code)]
+//! Nothing here uses the simulation. Tests (`tests/closed_form.rs`) hold these against outside computations and against each
+//! other; tests and studies of strands measure against them.
 
 pub mod cable;
 pub mod chain;

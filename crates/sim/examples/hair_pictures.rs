@@ -1,12 +1,12 @@
-//! Drawings of single hairs (Selle, Lentine, Fedkiw 2008, Figures 10 and 11 show such tests).
+//! Drawings of single hairs (Selle, Lentine, Fedkiw 2008, Figures 10 and 11 show such tests), as SVG files.
+//!
+//! `cargo run --release -p pelage-sim --example hair_pictures -- [FOLDER]`; the folder is `docs/pictures` if none is given.
+#![allow(missing_docs, clippy::disallowed_methods)]
 
-use crate::Write;
-use crate::common::{Shot, still};
+use pelage_sim::rig::{FRAME, Rig, still};
 use pelage_sim::{Body, End, Material, Root, Settings, Span};
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
-
-const FRAME: f64 = 1.0 / 24.0;
 
 /// A wavy or curly hair along `x`: a helix around its axis, `radius` and `pitch` in metres; 12 cm along the axis.
 fn helix(radius: f64, pitch: f64, direction: [f64; 2]) -> Vec<[f64; 3]> {
@@ -27,17 +27,17 @@ fn settings(bend: f64) -> Settings {
     Settings { sag_free: false, sleep: false, material, ..Settings::default() }
 }
 
-fn flat(shot: &Shot) -> Vec<[f64; 2]> {
+fn flat(shot: &Rig) -> Vec<[f64; 2]> {
     shot.hair(0).iter().map(|p| [p.x + 0.25 * p.z, p.y + 0.1 * p.z]).collect()
 }
 
 /// A straight hair whose clamped tip is pushed towards the root and turned about its axis.
-fn looped(write: Write) {
+fn looped(write: Write<'_>) {
     let length = 0.1;
     let points: Vec<[f64; 3]> = (0..=60).map(|i| [length * f64::from(i) / 60.0, 0.0, 0.0]).collect();
     let own = Settings { tip: End::Clamped, ..settings(1.0) };
     let gravity = [0.0, -0.3, 0.0];
-    let mut shot = Shot::new(std::slice::from_ref(&points), &own, gravity);
+    let mut shot = Rig::under(std::slice::from_ref(&points), &own, gravity).unwrap();
     let tip = |t: f64| {
         let angle = 0.5 * 1.6 * TAU * t;
         Root {
@@ -74,11 +74,21 @@ fn looped(write: Write) {
     );
 }
 
-pub fn draw(write: Write) {
+/// Writes an SVG file's text under a name.
+type Write<'a> = &'a dyn Fn(&str, String);
+
+fn main() {
+    let folder = std::env::args().nth(1).unwrap_or_else(|| "docs/pictures".to_string());
+    draw(&|name, text| {
+        std::fs::write(format!("{folder}/{name}.svg"), text).expect("the folder should exist");
+    });
+}
+
+fn draw(write: Write<'_>) {
     looped(write);
     let hang = [0.0, -1.0];
     // Under changing gravity: pulled straight, then let go.
-    let mut shot = Shot::new(&[helix(0.004, 0.02, hang)], &settings(2.0), [0.0; 3]);
+    let mut shot = Rig::under(&[helix(0.004, 0.02, hang)], &settings(2.0), [0.0; 3]).unwrap();
     let mut panels = vec![("natural shape".to_string(), vec![flat(&shot)])];
     for (gravity, seconds, name) in [
         (150.0, 1.5, "stretched by 150 m/s2"),
@@ -88,7 +98,7 @@ pub fn draw(write: Write) {
     ] {
         shot.gravity = [0.0, -gravity, 0.0];
         for _ in 0..(seconds / FRAME).ceil() as usize {
-            shot.wait(seconds / (seconds / FRAME).ceil());
+            shot.wait(seconds / (seconds / FRAME).ceil()).unwrap();
         }
         println!("curl: {name}: tip {:.4} m below, strain {:.1e}", -shot.tip(0).y, shot.last.largest_strain);
         panels.push((name.to_string(), vec![flat(&shot)]));
@@ -96,10 +106,10 @@ pub fn draw(write: Write) {
     write("hair-curl", drawing("A curl (stiffness x 2) stretched by gravity and let go", &panels));
     let mut panels = Vec::new();
     for bend in [0.2, 1.0, 5.0, 25.0] {
-        let mut shot = Shot::new(&[helix(0.004, 0.02, [1.0, 0.0])], &settings(bend), [0.0, -9.81, 0.0]);
+        let mut shot = Rig::under(&[helix(0.004, 0.02, [1.0, 0.0])], &settings(bend), [0.0, -9.81, 0.0]).unwrap();
         let mut lines = vec![flat(&shot)];
         for frame in 1..=48 {
-            shot.wait(FRAME);
+            shot.wait(FRAME).unwrap();
             if [1, 2, 4, 48].contains(&frame) {
                 lines.push(flat(&shot));
             }
@@ -112,10 +122,10 @@ pub fn draw(write: Write) {
     let mut panels = Vec::new();
     for radius in [0.0, 0.001, 0.002, 0.004] {
         let direction = [libm::cos(0.25 * PI), libm::sin(0.25 * PI)];
-        let mut shot = Shot::new(&[helix(radius, 0.015, direction)], &settings(4.0), [0.0, -9.81, 0.0]);
+        let mut shot = Rig::under(&[helix(radius, 0.015, direction)], &settings(4.0), [0.0, -9.81, 0.0]).unwrap();
         let mut lines = vec![flat(&shot)];
         for frame in 1..=72 {
-            shot.wait(FRAME);
+            shot.wait(FRAME).unwrap();
             if [2, 4, 72].contains(&frame) {
                 lines.push(flat(&shot));
             }
