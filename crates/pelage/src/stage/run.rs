@@ -450,7 +450,8 @@ impl<'a> Runner<'a> {
         // A step may turn out to be finished: another of this run had the same recipe.
         let (ran, found): (Vec<&Step>, Vec<&Step>) = todo.iter().partition(|s| self.ran.contains_key(&s.what));
         let found: Vec<&Step> = found.into_iter().filter(|s| !waiting.contains(&s.what)).collect();
-        (report.made, report.from_cache, report.alike) = (ran.len(), done.len(), found.len());
+        let cached = done.iter().filter(|s| !self.ran.contains_key(&s.what)).count();
+        (report.made, report.from_cache, report.alike) = (ran.len(), cached, found.len());
         let known = |s: &Step| self.seconds.get(&s.name).filter(|k| k.0 == s.key.0).map_or(0.0, |k| k.1);
         report.known_s = steps.iter().map(known).sum();
         (report.ran, report.reused) = match stage {
