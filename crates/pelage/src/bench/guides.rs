@@ -247,11 +247,12 @@ fn run(bench: &mut Bench<'_>) -> Result<Findings, Error> {
         )
         .says(
             "Processor seconds are those of the stage simulate, all threads added, the body's distance field included. \
-             RMS at rest is what the guides lose of the groom before anything moves.",
+             RMS at rest is what the guides lose of the groom before anything moves. In the rows of a part (the quick bench) the \
+             shot has 6 % of its hairs and its first 4 frames.",
         );
     let shares: &[usize] = if quick { &QUICK_SHARES } else { &SHARES };
     for &share in shares {
-        section.row(bench, &name(share), || {
+        section.row(bench, &name(share, quick), || {
             let guides = simulated(&shots::thinned(project()?, 1.0 / share as f64), true)?;
             Ok(compare(reference()?, &guides))
         })?;
@@ -260,7 +261,7 @@ fn run(bench: &mut Bench<'_>) -> Result<Findings, Error> {
         "A sixteenth of the hairs once more with 64 steps a frame, each hair against itself with the steps that are \
          chosen by default: below this, more guides make no hair more right.",
     );
-    let own = steps.row(bench, "default-steps", || {
+    let own = steps.row(bench, &format!("{}default-steps", part(quick)), || {
         let thin = shots::thinned(project()?, 1.0 / STEP_SHARE as f64);
         let mut fine = thin.clone();
         fine.shot.value.simulate.substeps = Some(FINE_STEPS);
@@ -270,7 +271,7 @@ fn run(bench: &mut Bench<'_>) -> Result<Findings, Error> {
         Ok(spread(each.map(|d| d * mm).collect()))
     })?;
     let pictured = [1, 16, 256];
-    let file = bench.picture("shares", || {
+    let file = bench.picture(if quick { "shares-part" } else { "shares" }, || {
         let full = reference()?;
         let each = pictured.map(|share| {
             let guides = simulated(&shots::thinned(project()?, 1.0 / share as f64), false)?;
@@ -286,8 +287,13 @@ fn run(bench: &mut Bench<'_>) -> Result<Findings, Error> {
     Ok(Findings { answers, sections: vec![section, steps] })
 }
 
-fn name(share: usize) -> String {
-    format!("1-of-{share}")
+/// Name of the point of a share; the quick bench has another shot.
+fn name(share: usize, quick: bool) -> String {
+    format!("{}1-of-{share}", part(quick))
+}
+
+fn part(quick: bool) -> &'static str {
+    if quick { "part/" } else { "" }
 }
 
 fn picture(full: &Full, project: &Project, quick: bool, each: Vec<Vec<[f32; 3]>>) -> Result<Vec<u8>, Error> {
@@ -338,7 +344,8 @@ fn plots(section: &Section, step: f64) -> Vec<String> {
 const HAIR: f64 = 0.32;
 
 fn answers(section: &Section, step: f64) -> Vec<String> {
-    let row = |share: usize| section.rows.iter().find(|(n, _)| *n == name(share)).map(|(_, v)| v.clone());
+    let row =
+        |share: usize| section.rows.iter().find(|(n, _)| n.ends_with(&name(share, false))).map(|(_, v)| v.clone());
     let (Some(all), Some(some), Some(few)) = (row(1), row(16), row(256)) else { return Vec::new() };
     let below = |k: usize, limit: f64| {
         let found = section.rows.iter().skip(1).rfind(|(_, v)| v[k] <= limit);

@@ -57,6 +57,7 @@ const SHADOW: [&str; 5] = ["points", "mean of all, %", "mean, %", "RMS differenc
 
 /// A sample at rest, and what is drawn of it.
 struct Shot {
+    shares: &'static [usize],
     still: Still,
     /// Names by layer and share of those chosen by rank.
     ranked: Vec<Vec<Vec<StrandId>>>,
@@ -69,10 +70,10 @@ struct Shot {
     whole: RefCell<BTreeMap<usize, [Image; 2]>>,
 }
 
-fn shot(folder: &Path, kind: Sample) -> Result<Shot, Error> {
+fn shot(folder: &Path, kind: Sample, shares: &'static [usize]) -> Result<Shot, Error> {
     let project = shots::project(folder, kind)?;
     let still = shots::still(&project)?;
-    let names = |i: usize| SHARES.iter().map(move |&s| (i, s));
+    let names = |i: usize| shares.iter().map(move |&s| (i, s));
     let ranked = (0..still.layers.len())
         .map(|i| names(i).map(|(i, s)| shots::names(&shots::thinned(&project, 1.0 / s as f64), i)).collect())
         .collect::<Result<Vec<_>, Error>>()?;
@@ -80,7 +81,7 @@ fn shot(folder: &Path, kind: Sample) -> Result<Shot, Error> {
     let widths = || still.layers.iter().flat_map(|l| &l.width);
     let width = widths().map(|w| f64::from(*w)).sum::<f64>() / widths().count() as f64;
     let large = drawn(&still, &still.layers, &camera, LARGE);
-    Ok(Shot { still, ranked, camera, width, large, whole: RefCell::default() })
+    Ok(Shot { shares, still, ranked, camera, width, large, whole: RefCell::default() })
 }
 
 /// White hair before black skin and nothing: a pixel is what hair covers of it.
@@ -95,7 +96,7 @@ fn drawn(still: &Still, layers: &[HairLayer], camera: &Camera, size: usize) -> I
 impl Shot {
     /// One hair of `share`, that many times as wide.
     fn chosen(&self, choice: Choice, share: usize) -> Vec<HairLayer> {
-        let at = SHARES.iter().position(|s| *s == share);
+        let at = self.shares.iter().position(|s| *s == share);
         let keep = |i: usize, id: StrandId| match (choice, at) {
             (_, None) => true,
             (Choice::Rank, Some(k)) => self.ranked[i][k].binary_search(&id).is_ok(),
@@ -158,7 +159,8 @@ fn shadows(layers: &[HairLayer], origin: [f64; 3]) -> Vec<Vec<f32>> {
 
 fn run(bench: &mut Bench<'_>) -> Result<Findings, Error> {
     let (folder, quick) = (bench.folder.to_path_buf(), bench.quick);
-    let (shares, sizes): (&[usize], &[usize]) = if quick { (&QUICK_SHARES, &QUICK_SIZES) } else { (&SHARES, &SIZES) };
+    let (shares, sizes): (&'static [usize], &[usize]) =
+        if quick { (&QUICK_SHARES, &QUICK_SIZES) } else { (&SHARES, &SIZES) };
     let mut coverage = Section::new("Coverage", &COLUMNS)
         .says(
             "White hair at rest before black skin: the mean of the picture is what hair covers of it. One hair of n is \
@@ -179,7 +181,7 @@ fn run(bench: &mut Bench<'_>) -> Result<Findings, Error> {
     let mut answers = Vec::new();
     for kind in [Sample::Bust, Sample::Animal] {
         let cell = OnceCell::new();
-        let shot = || shots::lazily(&cell, || shot(&folder, kind));
+        let shot = || shots::lazily(&cell, || shot(&folder, kind, shares));
         let name = format!("{kind:?}").to_lowercase();
         let mut found: Vec<Line> = Vec::new();
         for choice in [Choice::Rank, Choice::Hash] {

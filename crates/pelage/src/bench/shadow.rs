@@ -121,6 +121,7 @@ fn run(bench: &mut Bench<'_>) -> Result<Findings, Error> {
         let cell = OnceCell::new();
         let lit = || shots::lazily(&cell, || lit(&folder, kind, quick));
         let name = format!("{kind:?}").to_lowercase();
+        let of = format!("{name}/{}-points", POINTS[usize::from(quick)]);
         let mut maps = Section::new(&format!("Settings: {name}"), &COLUMNS).says(
             "Hair of the sample at rest under a slanted parallel light. The truth is the mean of exact rays (1,024, 512 in \
              the quick bench) past every hair over the map's footprint, 1/256 of its side, around each of 2,000 points (400); \
@@ -129,7 +130,7 @@ fn run(bench: &mut Bench<'_>) -> Result<Findings, Error> {
              of one thread.",
         );
         for (point, settings) in settings(quick) {
-            maps.row(bench, &format!("{name}/{point}"), || {
+            maps.row(bench, &format!("{of}/{point}"), || {
                 let lit = lit()?;
                 Ok(lit.measure(Source::Directional { direction: SUN }, None, &settings, &lit.truth))
             })?;
@@ -147,7 +148,7 @@ fn run(bench: &mut Bench<'_>) -> Result<Findings, Error> {
         ];
         // The quick bench has none: each needs rays of its own.
         for (point, source, opacity) in all.into_iter().take(if quick { 0 } else { 5 }) {
-            lights.row(bench, &format!("{name}/{point}"), || {
+            lights.row(bench, &format!("{of}/{point}"), || {
                 let lit = lit()?;
                 let truth = lit.exact(source(lit), opacity);
                 Ok(lit.measure(source(lit), opacity, &default, &truth))
