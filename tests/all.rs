@@ -15,4 +15,5 @@ mod reference;
 mod rows;
 mod samples;
 mod simulate;
+mod skips;
 mod watch;

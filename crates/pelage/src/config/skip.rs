@@ -15,7 +15,8 @@ pub struct Skip {
     /// Map over the skin: hair is made where it is 0.5 or more, and left out where it is less. Default: all hair is made.
     pub mask: Option<MapRef>,
     /// Pixels that hair should be wide in the picture of `preview.camera` where it comes nearest: of hair that is narrower a
-    /// part is made, as much wider as it is less, down to a 64th. Default: all hair is made.
+    /// part is made, as much wider as it is less, down to a 64th. 0.25 covers as much within 2 %; with 1 single hairs show.
+    /// Default: all hair is made.
     pub lod: Option<f64>,
     /// Scene units around what is seen, or under the mask, in which hair is made all the same, for the shadows that it throws.
     /// Default: 2 cm.
@@ -56,7 +57,7 @@ impl Document<ShotFile> {
             return bad(key, "needs the shot's camera, and there is none", help);
         }
         if s.lod.is_some_and(|x| !(x > 0.0 && x <= 1000.0)) {
-            return bad("skip.lod", "must be above 0 and at most 1000 pixels", "0.5 is usual");
+            return bad("skip.lod", "must be above 0 and at most 1000 pixels", "0.25 is usual");
         }
         if s.margin.is_some_and(|x| !(x >= 0.0 && x.is_finite())) {
             return bad("skip.margin", "must be 0 or more", "in scene units");

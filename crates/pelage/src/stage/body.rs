@@ -110,13 +110,12 @@ fn table(surface: &Surface, kind: BodyKind, axis: Option<[Vec3; 2]>, up: UpAxis)
     Table::cylinder(&surface.bvh, from, to, farthest(&across), TABLE)
 }
 
-/// What the shot has of bodies around the hair of a layer, whose roots at rest and longest hair give `region` (metres); `whole` is
-/// that of all hairs, with those that the shot does without.
+/// What the shot has of bodies around the hair of a layer, whose roots at rest and longest hair give `region` (metres).
 pub(super) fn colliders(
     run: &mut Runner<'_>,
     layer: usize,
     deforms: bool,
-    [region, whole]: [Option<Bounds>; 2],
+    region: Option<Bounds>,
 ) -> Result<Rc<Colliders>, Error> {
     if let Some((_, found)) = run.colliders.as_ref().filter(|(of, _)| *of == layer) {
         return Ok(found.clone());
@@ -129,7 +128,7 @@ pub(super) fn colliders(
     if run.project.rest.is_some() && (b.skin || deforms) {
         let skin = groom::skin(run)?;
         let rest = metres(&skin.mesh.position, unit);
-        out.anchor = deforms.then(|| Anchor::new(&rest, whole));
+        out.anchor = deforms.then(|| Anchor::new(&rest, region));
         if b.skin {
             let solid = closed(run, "the skin", &skin.mesh, &skin.topology);
             if deforms {

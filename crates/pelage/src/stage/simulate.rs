@@ -1,14 +1,16 @@
 //! Simulate: hair in motion, one stretch of frames after another, each from the checkpoint at the end of the one before.
 
 use super::body::{self, Colliders};
+use super::plan_kept::hairs_of;
 use super::run::{Counts, Runner};
-use super::{What, curves, groom, instance, interpolate};
+use super::{Skin, What, curves, groom, instance, interpolate};
 use crate::Error;
 use crate::cache::LongStep;
 use crate::config::{StrandModel, Target};
 use crate::format::{mcap, ply};
 use crate::project::SkinAt;
 use crate::timeline::Timeline;
+use pelage_geom::mesh::corners;
 use pelage_geom::ride::{Ride, ease_positions, rides};
 use pelage_geom::{Offsets, Pose, SurfacePoint, Vec3};
 use pelage_groom::control;
@@ -73,6 +75,16 @@ struct Source {
     root: Vec<SurfacePoint>,
     /// Where the roots are at rest, scene units.
     anchor: Vec<[f64; 3]>,
+    /// All of the layer's hairs, where the shot does without some: fields cover where they can come too, so that those that are
+    /// left move as they do among them.
+    whole: Option<Whole>,
+}
+
+/// Hairs of a layer with those that a shot does without.
+struct Whole {
+    root: Vec<SurfacePoint>,
+    /// Length of the longest, metres.
+    longest: f64,
 }
 
 /// Positions of a simulated layer at a frame, scene units relative to the skin's origin.
@@ -214,6 +226,7 @@ fn source(run: &mut Runner<'_>, i: usize) -> Result<Source, Error> {
             id: hair.id.clone(),
             root: hair.root.clone(),
             anchor: hair.anchors(),
+            whole: None,
         });
     }
     let skin = groom::skin(run)?;
@@ -229,6 +242,7 @@ fn source(run: &mut Runner<'_>, i: usize) -> Result<Source, Error> {
             id: roots.id.clone(),
             root: roots.root.clone(),
             anchor: anchors(&roots.root),
+            whole: Whole::of(run, i)?,
         });
     }
     let controls = groom::combed(run)?;
@@ -243,6 +257,7 @@ fn source(run: &mut Runner<'_>, i: usize) -> Result<Source, Error> {
         id: (0..controls.len() as u64).collect(),
         root: controls.root.clone(),
         anchor: anchors(&controls.root),
+        whole: None,
     })
 }
 
@@ -427,7 +442,13 @@ fn moment(
         Root { position: placement.invert(Vec3::from(r.position) * unit).into(), rotation: [q.i, q.j, q.k, q.w] }
     };
     let root: Vec<Root> = rides.par_iter().map(root).collect();
-    let region = source.region(root.iter().map(|r| r.position));
+    let region = match &source.whole {
+        Some(whole) => {
+            let root = whole.positions(&*groom::skin(run)?, position.as_deref());
+            around(&root.iter().map(|p| placement.invert(p * unit).into()).collect::<Vec<_>>(), whole.longest)
+        }
+        None => source.region(root.iter().map(|r| r.position)),
+    };
     let end = colliders.end(position.as_deref(), unit, &placement, region);
     let origin = run.origin()?;
     let relative = |r: &Ride| std::array::from_fn(|x| (r.position[x] - origin[x]) as f32);
@@ -457,17 +478,23 @@ fn around(root: &[[f64; 3]], longest: f64) -> Option<Bounds> {
     (low.x <= high.x).then(|| ((low - reach).into(), (high + reach).into()))
 }
 
-/// The same for all hairs of a layer, with those that the shot does without: what is left must move as it does among them.
-fn whole_region(run: &mut Runner<'_>, i: usize, region: Option<Bounds>) -> Result<Option<Bounds>, Error> {
-    if run.project.curves.is_some() || run.project.target(i) != Target::EveryHair {
-        return Ok(region);
+impl Whole {
+    fn of(run: &mut Runner<'_>, i: usize) -> Result<Option<Whole>, Error> {
+        if matches!(hairs_of(run.project, i), What::Roots(_)) {
+            return Ok(None);
+        }
+        let all = instance::grown(run, i)?;
+        let length = instance::feature(run, What::Length(i), i, &all)?;
+        let longest = f64::from(length.iter().fold(0.0f32, |a, b| a.max(*b)));
+        Ok(Some(Whole { root: all.root, longest: longest * run.project.shot.value.shot.meters_per_unit }))
     }
-    let (skin, all) = (groom::skin(run)?, instance::grown(run, i)?);
-    let unit = run.project.shot.value.shot.meters_per_unit;
-    let length = instance::feature(run, What::Length(i), i, &all)?;
-    let longest = length.iter().fold(0.0f32, |a, b| a.max(*b));
-    let root: Vec<[f64; 3]> = all.root.iter().map(|p| (p.blend(skin.corners(p)) * unit).into()).collect();
-    Ok(around(&root, f64::from(longest) * unit))
+
+    /// Roots on the skin at rest, or with its vertices at `position`, scene units.
+    fn positions(&self, skin: &Skin, position: Option<&[[f64; 3]]>) -> Vec<Vec3> {
+        let (position, triangle) = (position.unwrap_or(&skin.mesh.position), &skin.mesh.triangle);
+        let at = |p: &SurfacePoint| p.blend(corners(position, triangle[p.triangle as usize]));
+        self.root.par_iter().map(at).collect()
+    }
 }
 
 /// Simulates up to frame `end` and keeps every frame of the shot and a checkpoint now and then.
@@ -488,9 +515,14 @@ fn advance(
     let (layer, arrival) = (&project.groom.value.layer[running.layer].name, timeline.arrival());
     let origin = run.origin()?;
     let rest = running.source.anchor.iter().map(|p| p.map(|x| x * unit));
-    let region = running.source.region(rest);
-    let whole = whole_region(run, running.layer, region)?;
-    let colliders = body::colliders(run, running.layer, body::deforms(timeline), [region, whole])?;
+    let region = match &running.source.whole {
+        Some(whole) => {
+            let root = whole.positions(&*groom::skin(run)?, None);
+            around(&root.iter().map(|p| (p * unit).into()).collect::<Vec<_>>(), whole.longest)
+        }
+        None => running.source.region(rest),
+    };
+    let colliders = body::colliders(run, running.layer, body::deforms(timeline), region)?;
     let colliders: &Colliders = &colliders;
     let seconds = 1.0 / shot.shot.fps;
     let mut before = moment(run, timeline, &running.source, colliders, running.frame)?;
