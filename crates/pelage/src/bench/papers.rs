@@ -149,7 +149,7 @@ fn simulated(bench: &mut Bench<'_>, ball: &LazyCell<Ball>, findings: &mut Findin
     let (rod, paper) = (of("selle-long-5k", "rod"), of("selle-long-5k", "paper"));
     findings.answers.push(format!(
         "Selle's long hair (Table 2), a particle and step: paper {:.0} ns on 16 processors, here rod {:.0} ns, the paper's nine \
-         steps {:.0} ns; a frame of as much hair ({} points) {:.2} s by rods with 8 steps and {:.2} s by the nine steps, without \
+         steps {:.0} ns; a frame of as much hair ({:.0} points) {:.2} s by rods with 8 steps and {:.2} s by the nine steps, without \
          hair against hair. Largest strain: rods {:.0e}, nine steps {:.0e}.",
         rod[2], rod[3], paper[3], rod[4], rod[1], paper[1], rod[5], paper[5]
     ));
@@ -352,7 +352,7 @@ fn pictures(bench: &mut Bench<'_>, ball: &LazyCell<Ball>, findings: &mut Finding
     let file = bench.picture(&format!("steps-{hairs}-hairs"), || pair(drawn(ball, hairs, 1), false))?;
     let caption = format!(
         "One step a frame (left) and eight (right), {hairs} hairs; compare Figure 12: so long an implicit step stays whole and \
-         the mass looks alike, but single hairs stray."
+         the mass looks alike, but some hairs stray."
     );
     s.pictures.push((file, caption));
     findings.sections.push(s);
