@@ -6,7 +6,7 @@ use super::strand::{name, refused};
 use super::{Bench, Findings, Section, Study};
 use crate::Error;
 use pelage_sim::rig::{self, FRAME, Rig, turned};
-use pelage_sim::{Body, Field, Model, Part, Rigid, Settings, Shape, SimError, Vec3};
+use pelage_sim::{Body, Field, Material, Model, Part, Rigid, Settings, Shape, SimError, Vec3};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::sync::{LazyLock, Mutex};
@@ -34,6 +34,10 @@ const REFINED: (usize, u32, f64) = (80, 64, 1e-9);
 
 /// Segments of the hair where they are not varied.
 const SEGMENTS: usize = 40;
+
+/// Factor on the hair's stiffness with which all of it stands by itself. Below 3.4 some hairs are stiffened at the start by
+/// factors that come in notches of a few percent, and runs of other segments are of other hair.
+const STIFF: f64 = 4.0;
 
 /// The ball shakes once a second by 1 rad to both sides, about an axis that leans.
 pub(super) fn shake(frame: usize, f: f64) -> Rigid {
@@ -103,7 +107,8 @@ struct Shots {
 
 impl Shots {
     fn settings(model: Model, steps: u32) -> Settings {
-        Settings { model, substeps: Some(steps), ..Settings::default() }
+        let material = Material { bend_factor: STIFF, twist_factor: STIFF, ..Material::default() };
+        Settings { model, substeps: Some(steps), material, ..Settings::default() }
     }
 
     fn play(&self, body: bool, segments: usize, settings: &Settings) -> Result<Played, Error> {
@@ -183,8 +188,7 @@ fn run(bench: &mut Bench<'_>) -> Result<Findings, Error> {
             }
             series.push(Series::new(v.what, points));
         }
-        let default =
-            shots.point(bench, &mut section, body, SEGMENTS, &Settings { substeps: Some(8), ..Settings::default() })?;
+        let default = shots.point(bench, &mut section, body, SEGMENTS, &Shots::settings(Model::Rod, 8))?;
         series[0].mark = Some([default[4], default[0]]);
         findings.answers.push(answer(body, &section, default));
         let title = if body { "On the ball: error against time" } else { "Without a body: error against time" };
@@ -202,7 +206,7 @@ fn introduction() -> Section {
         .says(
             "Hairs of 20 cm stand on the upper half of a ball of 9 cm and lie around it. It shakes once a second by 1 rad to both \
              sides, 24 frames, from rest at once, in air, with all defaults but what the point names (model, segments, steps a \
-             frame, tolerance). Once without the ball as a body, once with its distance field.",
+             frame, tolerance) and hair four times as stiff, so that all of it stands by itself (see The start). Once without the ball as a body, once with its distance field.",
         )
         .says(
             "Distance at ten equal arc lengths of each hair in each frame, in lengths of the hair: the root of the mean square \
@@ -276,11 +280,12 @@ fn answer(body: bool, section: &Section, default: [f64; 5]) -> String {
 fn starts(bench: &mut Bench<'_>, shots: &Shots, findings: &mut Findings) -> Result<(), Error> {
     let columns = ["hairs stiffened", "largest factor", "sum of factors"];
     let mut s = Section::new("The start", &columns).says(
-        "Hair that could not stand in its groomed pose is stiffened by the least factor with which it can, before the first \
-         frame: a property of the hair, which should not depend on its segments. Where factors change with the segments, the \
-         search for them errs, and runs with other segments are another shot.",
+        "The same hairs with the stiffness of real hair: what could not stand in its groomed pose is stiffened by the least \
+         factor with which it can, found by halving in notches of a few percent. That is a property of the hair and should \
+         not depend on its segments. Where the sum of factors grows with the segments, the search errs: hair is stiffer than \
+         it needs to be. No reference but the other rows.",
     );
-    let all: &[usize] = if bench.quick { &[40, 80, 160] } else { &[10, 20, 40, 80, 120, 160, 240] };
+    let all: &[usize] = if bench.quick { &[40, 80, 240] } else { &[10, 20, 40, 80, 120, 160, 240] };
     for segments in all {
         s.row(bench, &format!("start/{}-hairs/{segments}-segments", shots.hairs), || {
             let hairs = rig::tuft(RADIUS, shots.hairs, LENGTH, segments + 1);
@@ -293,12 +298,12 @@ fn starts(bench: &mut Bench<'_>, shots: &Shots, findings: &mut Findings) -> Resu
     }
     let sum = |v: &[f64]| v[2];
     let usual = s.rows.iter().find(|(p, _)| p.ends_with("/40-segments")).map_or(f64::NAN, |(_, v)| sum(v));
-    let strays = |r: &&(String, Vec<f64>)| (sum(&r.1) / usual - 1.0).abs() > 0.01;
+    let strays = |r: &&(String, Vec<f64>)| (sum(&r.1) / usual - 1.0).abs() > 0.1;
     let off: Vec<&str> = s.rows.iter().filter(strays).filter_map(|(p, _)| p.rsplit('/').next()).collect();
     findings.answers.push(match off[..] {
-        [] => "Stiffening at the start does not depend on the segments.".to_owned(),
+        [] => "Stiffening at the start depends on the segments by less than 10 %.".to_owned(),
         _ => format!(
-            "Stiffening at the start differs by more than 1 % from that with 40 segments at: {}.",
+            "Stiffening at the start is off by more than 10 % from that of 40 segments with: {}.",
             off.join(", ")
         ),
     });
