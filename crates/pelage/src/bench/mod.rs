@@ -125,8 +125,7 @@ impl<'a> Bench<'a> {
         if !ours && !before.is_empty() {
             progress.say(&format!("note: {} is of another program or machine: measured anew", path.display()));
         }
-        let kept: BTreeMap<String, Vec<f64>> =
-            before.lines().skip(1).filter(|_| ours).filter_map(|l| parse(l)).collect();
+        let kept: BTreeMap<String, Vec<f64>> = before.lines().skip(1).filter(|_| ours).filter_map(parse).collect();
         // Written anew: the last line may have been cut.
         let mut file = File::create(&path).map_err(Error::disk(&path))?;
         let lines: String = kept.iter().map(|(name, values)| line(name, values)).collect();

@@ -46,7 +46,7 @@ fn escaped(text: &str) -> String {
 fn number(v: f64) -> String {
     match v.abs() {
         _ if v.is_nan() => "-".to_owned(),
-        a if a == 0.0 || (a >= 1000.0 && a < 1e7 && v.fract() == 0.0) => format!("{v}"),
+        a if a == 0.0 || ((1000.0..1e7).contains(&a) && v.fract() == 0.0) => format!("{v}"),
         a if (1e-3..1e6).contains(&a) => {
             let digits = (3 - libm::floor(libm::log10(a)) as i32).clamp(0, 6) as usize;
             let text = format!("{v:.digits$}");
@@ -67,10 +67,10 @@ const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:62rem;mar
 fn html(found: &[(Study, Findings)], folder: &Path, quick: bool, facts: &Value) -> String {
     let mut o = String::new();
     let title = if quick { "Error against run time (quick)" } else { "Error against run time" };
-    let _ = write!(
+    let _ = writeln!(
         o,
         "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Pelage: {title}</title><style>{STYLE}</style>\
-         <h1>{title}</h1>\n"
+         <h1>{title}</h1>"
     );
     let list: Vec<String> = found.iter().map(|(s, _)| format!("<a href=\"#{0}\">{0}</a>", s.name)).collect();
     let _ = writeln!(o, "<p>Studies: {}.</p><h3>In short</h3><ul>", list.join(", "));
