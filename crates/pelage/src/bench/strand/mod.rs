@@ -80,6 +80,9 @@ impl At {
     }
 }
 
+/// Takes the variant's value and the resolution.
+type Measure<'a> = dyn Fn(f64, At, &mut Clock) -> Result<[f64; 2], SimError> + Sync + 'a;
+
 /// A case of several sizes at some resolutions.
 struct Case<'a> {
     name: &'a str,
@@ -90,7 +93,7 @@ struct Case<'a> {
     finer: Finer,
     /// Error against the reference, against the reference cut into as many segments (NaN where there is none); the clock
     /// takes the time.
-    measure: &'a (dyn Fn(f64, At, &mut Clock) -> Result<[f64; 2], SimError> + Sync),
+    measure: &'a Measure<'a>,
 }
 
 #[derive(Clone, Copy, PartialEq)]
