@@ -351,3 +351,22 @@ fn stress_tells_what_hair_bears() {
     let err = String::from_utf8_lossy(&out.stderr).into_owned();
     assert!(out.status.code() == Some(2) && err.contains("no case `nonsense`") && err.contains("teleport"), "{err}");
 }
+
+#[test]
+fn bench_measures_points_by_name() {
+    let shot = ShotFolder::new(COMMAND);
+    let list = shot.succeed(&["bench", "--list", "--quick"]);
+    let studies =
+        ["strand", "shot", "guides", "collision", "shadow", "instancing", "lod", "skips", "papers", "scaling"];
+    assert!(studies.iter().all(|s| list.lines().any(|l| l.starts_with(&format!("{s} ")))), "{list}");
+    let point = list.lines().map(str::trim).find(|l| l.starts_with("strand/")).expect("a point");
+    let numbers = shot.succeed(&["bench", "--quick", "--point", point, "--quiet"]);
+    assert!(numbers.split_whitespace().all(|n| n.parse::<f64>().is_ok()), "{numbers}");
+    assert!(!shot.path().join("out").exists(), "a point alone leaves nothing");
+    for (arguments, says) in [(["--study", "nonsense"], "the studies are"), (["--point", "strand/nonsense"], "--list")]
+    {
+        let out = shot.pelage(&["bench", arguments[0], arguments[1]]);
+        let err = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(out.status.code() == Some(2) && err.contains("nonsense") && err.contains(says), "{err}");
+    }
+}

@@ -256,3 +256,63 @@ pub fn one(point: &str, folder: &Path, quick: bool, progress: &mut Progress) -> 
         other => other.map(|_| None),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    static MEASURED: AtomicUsize = AtomicUsize::new(0);
+
+    fn three(bench: &mut Bench<'_>) -> Result<Findings, Error> {
+        let mut section = Section::new("Three", &["value", "other"]);
+        for k in 0..3 {
+            section.row(bench, &format!("point-{k}"), || {
+                MEASURED.fetch_add(1, Ordering::Relaxed);
+                Ok([f64::from(k), f64::NAN])
+            })?;
+        }
+        let sum: f64 = section.rows.iter().map(|r| r.1[0]).sum();
+        Ok(Findings { answers: vec![format!("sum {sum} <3")], sections: vec![section] })
+    }
+
+    /// Points are measured once, kept at once, measured again where the file was cut, and listed without being measured.
+    #[test]
+    fn points_are_kept() {
+        let study = Study { name: "three", about: "Three points.", run: three };
+        let folder = tempfile::tempdir().unwrap();
+        let mut progress = Progress::new(true);
+        let mut bench = |expected: usize| {
+            MEASURED.store(0, Ordering::Relaxed);
+            run(&[study], folder.path(), true, &mut progress).unwrap();
+            assert_eq!(MEASURED.load(Ordering::Relaxed), expected);
+            std::fs::read_to_string(folder.path().join("report.html")).unwrap()
+        };
+        assert_eq!(points(&study, folder.path(), true).unwrap(), ["three/point-0", "three/point-1", "three/point-2"]);
+        let first = bench(3);
+        assert!(first.contains("sum 3 &lt;3") && first.contains("point-2") && !first.contains("NaN"));
+        assert_eq!(bench(0), first);
+        let kept = folder.path().join(POINTS);
+        let text = std::fs::read_to_string(&kept).unwrap();
+        std::fs::write(&kept, &text[..text.len() - 9]).unwrap();
+        assert_eq!(bench(1), first);
+        std::fs::write(&kept, text.replacen("{", "{ ", 1)).unwrap();
+        bench(3);
+        let csv = std::fs::read_to_string(folder.path().join("points.csv")).unwrap();
+        assert!(csv.contains("three,\"Three\",\"point-1\",\"value\",1e0"), "{csv}");
+    }
+
+    /// Every study can be listed without measuring anything, and no two points have one name.
+    #[test]
+    fn all_studies_can_be_listed() {
+        let folder = Path::new("nowhere");
+        for (study, quick) in STUDIES.iter().flat_map(|s| [(s, false), (s, true)]) {
+            let mut names = points(study, folder, quick).unwrap();
+            assert!(!names.is_empty() && !folder.exists(), "{}", study.name);
+            let count = names.len();
+            names.sort();
+            names.dedup();
+            assert_eq!(names.len(), count, "{}", study.name);
+        }
+    }
+}

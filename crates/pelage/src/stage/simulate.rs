@@ -1,23 +1,19 @@
 //! Simulate: hair in motion, one stretch of frames after another, each from the checkpoint at the end of the one before.
 
+mod moment;
+
 use super::body::{self, Colliders};
-use super::plan_kept::hairs_of;
 use super::run::{Counts, Runner};
-use super::{Skin, What, curves, groom, instance, interpolate};
+use super::{What, instance};
 use crate::Error;
 use crate::cache::LongStep;
-use crate::config::{StrandModel, Target};
-use crate::format::{mcap, ply};
-use crate::project::SkinAt;
+use crate::config::StrandModel;
+use crate::format::mcap;
 use crate::timeline::Timeline;
-use pelage_geom::mesh::corners;
-use pelage_geom::ride::{Ride, ease_positions, rides};
-use pelage_geom::{Offsets, Pose, SurfacePoint, Vec3};
-use pelage_groom::control;
-use pelage_groom::keep::near;
-use pelage_sim::{Bounds, Hairs, Model, Rigid, Root, Settings, SimError, Simulation, Span, SpanReport, Started};
+use moment::{Source, check_at_rest, moment, rest_region, source, still};
+use pelage_geom::Vec3;
+use pelage_sim::{Hairs, Model, Rigid, Settings, SimError, Simulation, Span, SpanReport, Started};
 use rayon::prelude::*;
-use std::rc::Rc;
 use std::time::Instant;
 
 /// Checkpoints within a stretch take at most this share of the time: a run that is killed loses about as little as that
@@ -26,16 +22,6 @@ const SAVING: f64 = 0.03;
 
 /// Strands that a warning names.
 const NAMED: usize = 8;
-
-/// How far roots may be from their rest pose where the simulation starts, relative to the hair's size; a turn in radians squared.
-const AT_REST: f64 = 1e-6;
-
-/// Room around the roots that fields cover, in lengths of the longest hair: hair stretches by a hundredth or so, and roots
-/// of a deforming skin move apart between frames. More makes fields for nothing.
-const REACH: f64 = 1.1;
-
-/// And metres more: what hair keeps from the body, and how far ahead contacts are looked for.
-const MARGIN: f64 = 0.02;
 
 /// Count of strands at rest: what the stage skips.
 pub(super) const SLEEPING: &str = "sleeping_strands";
@@ -63,28 +49,6 @@ pub(super) struct Running {
     frame: i64,
     sim: Simulation,
     source: Source,
-}
-
-/// Hairs at rest, as they are simulated.
-struct Source {
-    offsets: Offsets,
-    /// Metres.
-    position: Vec<[f64; 3]>,
-    id: Vec<u64>,
-    /// On the rest skin; empty without one.
-    root: Vec<SurfacePoint>,
-    /// Where the roots are at rest, scene units.
-    anchor: Vec<[f64; 3]>,
-    /// All of the layer's hairs, where the shot does without some: fields cover where they can come too, so that those that are
-    /// left move as they do among them.
-    whole: Option<Whole>,
-}
-
-/// Hairs of a layer with those that a shot does without.
-struct Whole {
-    root: Vec<SurfacePoint>,
-    /// Length of the longest, metres.
-    longest: f64,
 }
 
 /// Positions of a simulated layer at a frame, scene units relative to the skin's origin.
@@ -215,52 +179,6 @@ fn size(bytes: u64) -> String {
     if mega < 1000.0 { format!("{:.0} MB", mega.ceil()) } else { format!("{:.1} GB", mega / 1e3) }
 }
 
-fn source(run: &mut Runner<'_>, i: usize) -> Result<Source, Error> {
-    let unit = run.project.shot.value.shot.meters_per_unit;
-    if run.project.curves.is_some() {
-        let (hair, offsets) = (curves::hair(run)?, curves::offsets(run)?);
-        let rest = interpolate::positions(run, What::Rest(i))?;
-        return Ok(Source {
-            offsets,
-            position: rest.iter().map(|p| hair.scene(p).map(|x| x * unit)).collect(),
-            id: hair.id.clone(),
-            root: hair.root.clone(),
-            anchor: hair.anchors(),
-            whole: None,
-        });
-    }
-    let skin = groom::skin(run)?;
-    let anchors = |root: &[SurfacePoint]| root.iter().map(|p| p.blend(skin.corners(p)).into()).collect();
-    if run.project.target(i) == Target::EveryHair {
-        let (roots, points) = (instance::roots(run, i)?, run.project.base_points(i));
-        let rest = interpolate::positions(run, What::Rest(i))?;
-        let origin = skin.origin();
-        let metres = |p: &[f32; 3]| std::array::from_fn(|x| (f64::from(p[x]) + origin[x]) * unit);
-        return Ok(Source {
-            offsets: Offsets::uniform(roots.id.len(), points),
-            position: rest.par_iter().map(metres).collect(),
-            id: roots.id.clone(),
-            root: roots.root.clone(),
-            anchor: anchors(&roots.root),
-            whole: Whole::of(run, i)?,
-        });
-    }
-    let controls = groom::combed(run)?;
-    let on = control::Skin { mesh: &skin.mesh, topology: &skin.topology, rest: &skin.rest };
-    let hair = |h: usize| {
-        let frame = on.frame(&controls.root[h]);
-        controls.placed(h, &frame).map(|p| (p * unit).into()).collect::<Vec<[f64; 3]>>()
-    };
-    Ok(Source {
-        offsets: Offsets::uniform(controls.len(), controls.points),
-        position: (0..controls.len()).flat_map(hair).collect(),
-        id: (0..controls.len() as u64).collect(),
-        root: controls.root.clone(),
-        anchor: anchors(&controls.root),
-        whole: None,
-    })
-}
-
 fn settings(run: &Runner<'_>, i: usize) -> Settings {
     let s = &run.project.shot.value.simulate;
     Settings {
@@ -330,173 +248,6 @@ fn list(ids: &[u64]) -> String {
     named.join(", ") + &more
 }
 
-/// Vertices of a skin that deforms, at a frame; `None` for one that moves as a whole.
-fn skin_position(run: &mut Runner<'_>, timeline: &Timeline<'_>, frame: i64) -> Result<Option<Vec<[f64; 3]>>, Error> {
-    if !body::deforms(timeline) {
-        return Ok(None);
-    }
-    let (skin, arrival) = (groom::skin(run)?, timeline.arrival());
-    let read = |frame: i64| match timeline.skin_at(frame) {
-        Some(SkinAt::File(file)) => Ok(ply::read_frame(&file.path, skin.mesh.position.len(), skin.faces())?),
-        _ => Ok::<_, Error>(skin.mesh.position.clone()),
-    };
-    if frame >= arrival {
-        return read(frame).map(Some);
-    }
-    let target = read(arrival)?;
-    let next = if timeline.skin_at(arrival + 1).is_some() { read(arrival + 1)? } else { target.clone() };
-    let (s, frames) = timeline.way(arrival, frame);
-    Ok(Some(ease_positions(&skin.mesh.position, &target, &next, frames, s)))
-}
-
-/// Where the roots are on a skin that deforms; at rest for one that moves as a whole.
-fn root_rides(run: &mut Runner<'_>, source: &Source, position: Option<&[[f64; 3]]>) -> Result<Vec<Ride>, Error> {
-    let Some(position) = position else { return Ok(source.anchor.iter().map(|a| Ride::still(*a)).collect()) };
-    let skin = groom::skin(run)?;
-    let pose = Pose::new(&skin.mesh, &skin.topology, position.to_vec());
-    Ok(rides(&skin.mesh, &skin.topology, &skin.rest, &pose, &source.root, &source.anchor))
-}
-
-/// Without pre-roll the simulation starts at the first frame: there the skin must be at rest.
-fn check_at_rest(run: &mut Runner<'_>, timeline: &Timeline<'_>, source: &Source) -> Result<(), Error> {
-    let position = skin_position(run, timeline, timeline.first)?;
-    let mut now = root_rides(run, source, position.as_deref())?;
-    if let Some(t) = timeline.rigid(timeline.first, timeline.first as f64) {
-        let place = |r: &mut Ride| *r = Ride { position: t.apply(Vec3::from(r.position)).into(), rotation: t.rotation };
-        now.iter_mut().for_each(place);
-    }
-    let unit = run.project.shot.value.shot.meters_per_unit;
-    let (low, high) = bounds(&source.position);
-    let tolerance = AT_REST * (high - low).norm() / unit;
-    let moved = |(a, b): (&[f64; 3], &Ride)| {
-        (Vec3::from(*a) - Vec3::from(b.position)).norm() > tolerance || b.rotation[3].abs() < 1.0 - AT_REST
-    };
-    if source.anchor.iter().zip(&now).any(moved) {
-        let what = format!("is 0, but roots are not at their rest pose at frame {}", timeline.first);
-        let help = "give it frames to come there from the rest pose: 12 is usual";
-        return Err(run.project.shot.error("shot.preroll", what, help).into());
-    }
-    Ok(())
-}
-
-fn bounds(points: &[[f64; 3]]) -> (Vec3, Vec3) {
-    let start = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
-    points.iter().fold(start, |(low, high), p| (low.inf(&Vec3::from(*p)), high.sup(&Vec3::from(*p))))
-}
-
-/// The skin and the roots on it at a frame, as hair collides with and hangs on it.
-struct Moment {
-    /// Where the coordinates of the roots are: the rigid part of a deforming skin's motion.
-    placement: Rigid,
-    root: Vec<Root>,
-    /// A skin that deforms.
-    skin: Option<Deformed>,
-    end: Option<Rc<body::End>>,
-}
-
-/// A skin that deforms, scene units.
-struct Deformed {
-    position: Vec<[f64; 3]>,
-    /// Roots on it, relative to the skin's origin.
-    root: Vec<[f32; 3]>,
-}
-
-/// Hairs around which a skin that deforms stays as it is from one frame to the next. Nothing else may move.
-fn still(run: &mut Runner<'_>, source: &Source, before: &Deformed, now: &Deformed) -> Result<Vec<bool>, Error> {
-    let skin = groom::skin(run)?;
-    let (unit, origin) = (run.project.shot.value.shot.meters_per_unit, skin.origin());
-    let moves = |v: &u32| before.position[*v as usize] != now.position[*v as usize];
-    let (mut moving, mut longest) = (vec![false; now.position.len()], 0.0f64);
-    for t in skin.mesh.triangle.iter().filter(|t| t.iter().any(moves)) {
-        t.iter().for_each(|v| moving[*v as usize] = true);
-        for pose in [&before.position, &now.position] {
-            let corner = t.map(|v| Vec3::from(pose[v as usize]));
-            longest = (0..3).map(|k| (corner[k] - corner[(k + 1) % 3]).norm()).fold(longest, f64::max);
-        }
-    }
-    let of = |pose: &[[f64; 3]]| -> Vec<[f32; 3]> {
-        let relative = |p: &[f64; 3]| std::array::from_fn(|x| (p[x] - origin[x]) as f32);
-        pose.iter().zip(&moving).filter(|(_, m)| **m).map(|(p, _)| relative(p)).collect()
-    };
-    let place = [of(&before.position), of(&now.position)].concat();
-    // What moves of a triangle is no farther from one of its corners than its longest edge.
-    let reach = |h: usize| ((source.length(h) * REACH + MARGIN) / unit + longest) as f32;
-    let distance: Vec<f32> = (0..source.id.len()).map(reach).collect();
-    Ok(near(&now.root, &distance, &place).into_iter().map(|near| !near).collect())
-}
-
-fn moment(
-    run: &mut Runner<'_>,
-    timeline: &Timeline<'_>,
-    source: &Source,
-    colliders: &Colliders,
-    frame: i64,
-) -> Result<Moment, Error> {
-    let unit = run.project.shot.value.shot.meters_per_unit;
-    let position = skin_position(run, timeline, frame)?;
-    let rides = root_rides(run, source, position.as_deref())?;
-    let placement = colliders.placement(position.as_deref(), unit);
-    let turn = placement.quaternion().inverse();
-    let root = |r: &Ride| {
-        let q = turn * Rigid { rotation: r.rotation, translation: [0.0; 3] }.quaternion();
-        Root { position: placement.invert(Vec3::from(r.position) * unit).into(), rotation: [q.i, q.j, q.k, q.w] }
-    };
-    let root: Vec<Root> = rides.par_iter().map(root).collect();
-    let region = match &source.whole {
-        Some(whole) => {
-            let root = whole.positions(&*groom::skin(run)?, position.as_deref());
-            around(&root.iter().map(|p| placement.invert(p * unit).into()).collect::<Vec<_>>(), whole.longest)
-        }
-        None => source.region(root.iter().map(|r| r.position)),
-    };
-    let end = colliders.end(position.as_deref(), unit, &placement, region);
-    let origin = run.origin()?;
-    let relative = |r: &Ride| std::array::from_fn(|x| (r.position[x] - origin[x]) as f32);
-    let skin = position.map(|position| Deformed { position, root: rides.iter().map(relative).collect() });
-    Ok(Moment { placement, root, skin, end })
-}
-
-impl Source {
-    /// Length of a hair, metres.
-    fn length(&self, h: usize) -> f64 {
-        let hair = &self.position[self.offsets.range(h)];
-        hair.windows(2).map(|p| (Vec3::from(p[1]) - Vec3::from(p[0])).norm()).sum()
-    }
-
-    /// Where hair can come that hangs on these roots (metres); `None` without roots.
-    fn region(&self, root: impl Iterator<Item = [f64; 3]>) -> Option<Bounds> {
-        let longest = (0..self.id.len()).map(|h| self.length(h)).fold(0.0, f64::max);
-        around(&root.collect::<Vec<_>>(), longest)
-    }
-}
-
-/// Where hair of a length can come that hangs on these roots (metres); `None` without roots.
-fn around(root: &[[f64; 3]], longest: f64) -> Option<Bounds> {
-    let finite: Vec<[f64; 3]> = root.iter().copied().filter(|p| p.iter().all(|x| x.is_finite())).collect();
-    let (low, high) = bounds(&finite);
-    let reach = Vec3::repeat(longest * REACH + MARGIN);
-    (low.x <= high.x).then(|| ((low - reach).into(), (high + reach).into()))
-}
-
-impl Whole {
-    fn of(run: &mut Runner<'_>, i: usize) -> Result<Option<Whole>, Error> {
-        if matches!(hairs_of(run.project, i), What::Roots(_)) {
-            return Ok(None);
-        }
-        let all = instance::grown(run, i)?;
-        let length = instance::feature(run, What::Length(i), i, &all)?;
-        let longest = f64::from(length.iter().fold(0.0f32, |a, b| a.max(*b)));
-        Ok(Some(Whole { root: all.root, longest: longest * run.project.shot.value.shot.meters_per_unit }))
-    }
-
-    /// Roots on the skin at rest, or with its vertices at `position`, scene units.
-    fn positions(&self, skin: &Skin, position: Option<&[[f64; 3]]>) -> Vec<Vec3> {
-        let (position, triangle) = (position.unwrap_or(&skin.mesh.position), &skin.mesh.triangle);
-        let at = |p: &SurfacePoint| p.blend(corners(position, triangle[p.triangle as usize]));
-        self.root.par_iter().map(at).collect()
-    }
-}
-
 /// Simulates up to frame `end` and keeps every frame of the shot and a checkpoint now and then.
 fn advance(
     run: &mut Runner<'_>,
@@ -514,14 +265,7 @@ fn advance(
     let (gravity, wind) = (shot.simulate.gravity.downward(shot.shot.up), shot.simulate.wind.as_ref());
     let (layer, arrival) = (&project.groom.value.layer[running.layer].name, timeline.arrival());
     let origin = run.origin()?;
-    let rest = running.source.anchor.iter().map(|p| p.map(|x| x * unit));
-    let region = match &running.source.whole {
-        Some(whole) => {
-            let root = whole.positions(&*groom::skin(run)?, None);
-            around(&root.iter().map(|p| (p * unit).into()).collect::<Vec<_>>(), whole.longest)
-        }
-        None => running.source.region(rest),
-    };
+    let region = rest_region(run, &running.source)?;
     let colliders = body::colliders(run, running.layer, body::deforms(timeline), region)?;
     let colliders: &Colliders = &colliders;
     let seconds = 1.0 / shot.shot.fps;
