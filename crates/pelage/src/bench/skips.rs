@@ -52,15 +52,19 @@ fn run(bench: &mut Bench<'_>) -> Result<Findings, Error> {
         .says("masked: long hair, [skip] mask. view: fur of a fox, [skip] camera, seen from near. still: fur of a fox that moves \
                its tail only, simulate.sleep on and off. distant: fur of a fox, [skip] lod = 1, seen from afar.");
     let kinds = [("masked", Kind::Masked), ("view", Kind::View), ("still", Kind::Still), ("distant", Kind::Distant)];
-    let frames = if bench.quick { 4 } else { 24 };
+    let frames = if bench.quick { 3 } else { 24 };
     let mut answers = Vec::new();
     for (name, kind) in kinds {
         let folder = bench.folder.join("shots");
         // Fields of a deforming skin cost as much for few hairs as for many: a shot of few says little.
-        let per_cm2 = match kind {
-            Kind::Masked => 8,
-            Kind::Still if !bench.quick => 140,
-            _ => 35,
+        let per_cm2 = match (kind, bench.quick) {
+            (Kind::Masked, true) => 3,
+            (Kind::Masked, false) => 8,
+            (Kind::View, true) => 10,
+            (Kind::Still, false) => 140,
+            (_, false) => 35,
+            // They take minutes.
+            (Kind::Still | Kind::Distant, true) => continue,
         };
         let [left, _, _, saved, most, ..] =
             section.row(bench, &format!("{name}/{per_cm2}-per-cm2/{frames}-frames"), || {
