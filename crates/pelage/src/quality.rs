@@ -10,7 +10,7 @@ use crate::files::write_whole;
 use crate::progress::Progress;
 use crate::project::Project;
 use crate::report::Report;
-use crate::stage::{Options, Runner, Stage, simulate};
+use crate::stage::{Options, Plan, Runner, Stage, simulate};
 use pelage_geom::Vec3;
 use serde::{Deserialize, Serialize};
 use std::io::Write;
@@ -49,6 +49,8 @@ pub struct Choice {
 pub struct Resolved {
     /// The budget that it was chosen for.
     pub budget: String,
+    /// Hash of the shot that it was chosen in, apart from these settings.
+    pub shot: String,
     /// The settings.
     pub settings: Choice,
     /// What they were found to give.
@@ -80,15 +82,42 @@ pub fn resolved(shot: &Path, budget: &Quality) -> Result<Option<Resolved>, Error
         let what = format!("{}: {}", path.display(), e.message());
         Error::input(what, "delete it, and settings are chosen again")
     })?;
+    let Choice { substeps, segments, tolerance } = found.settings;
+    if !(1..=1_000_000).contains(&substeps) || !(1..=4095).contains(&segments) || !(1e-12..=0.1).contains(&tolerance) {
+        let what = format!("{}: settings are out of range", path.display());
+        return Err(Error::input(what, "delete it, and settings are chosen again"));
+    }
     Ok((found.budget == budget.to_string()).then_some(found))
+}
+
+/// Hash of what is simulated, apart from the settings that a budget chooses.
+fn shot_hash(project: &Project) -> String {
+    let mut plain = project.clone();
+    let s = &mut plain.shot.value.simulate;
+    (s.segments, s.substeps, s.tolerance) = (None, None, None);
+    let plan = Plan::new(&plain);
+    let keys = plan.steps.iter().filter(|s| s.stage == Stage::Simulate).map(|s| s.key.0.as_str());
+    blake3::hash(keys.collect::<String>().as_bytes()).to_hex()[..16].to_owned()
 }
 
 /// Opens a shot; where it has a budget that nothing was chosen for yet, chooses first.
 pub fn open(shot: &Path, progress: &mut Progress) -> Result<Project, Error> {
     let project = Project::open(shot)?;
-    let Some(budget) = project.shot.value.simulate.quality.filter(|_| project.quality.is_none()) else {
+    let Some(budget) = project.shot.value.simulate.quality else { return Ok(project) };
+    if (0..project.groom.value.layer.len()).all(|i| project.target(i) == Target::Off) {
+        let help = "simulate something, or take it out";
+        return Err(project.shot.error("simulate.quality", "nothing is simulated in this shot", help).into());
+    }
+    if let Some(chosen) = &project.quality {
+        if chosen.shot != shot_hash(&project) {
+            let file = project.label(&file_of(shot));
+            progress.say(&format!(
+                "note: {file} was chosen before the shot was edited: its settings are used, its estimates may be off; delete it to \
+                 choose again"
+            ));
+        }
         return Ok(project);
-    };
+    }
     let chosen = choose(&project, &budget, progress)?;
     let path = file_of(shot);
     let text = format!(
@@ -127,22 +156,23 @@ fn search(project: &Project, budget: &Quality, folder: &Path, progress: &mut Pro
     for choice in axes().concat() {
         search.measure(&choice)?;
     }
-    let mut guesses = guesses(&search.found);
-    match budget {
-        Quality::Error(mm) => {
-            guesses.retain(|g| g.1.error_mm <= *mm);
-            guesses.sort_by(|a, b| a.1.seconds_per_frame.total_cmp(&b.1.seconds_per_frame));
-        }
-        Quality::Seconds(s) => {
-            guesses.retain(|g| g.1.seconds_per_frame <= *s);
-            guesses.sort_by(|a, b| a.1.error_mm.total_cmp(&b.1.error_mm));
-        }
-    }
-    // The best guess is measured; where it does not keep the budget the next best is.
+    // What a budget is of, over it; and what is to be as small as can be.
     let against = |e: &Estimate| match budget {
         Quality::Error(mm) => e.error_mm / mm,
         Quality::Seconds(s) => e.seconds_per_frame / s,
     };
+    let price = |e: &Estimate| match budget {
+        Quality::Error(_) => e.seconds_per_frame,
+        Quality::Seconds(_) => e.error_mm,
+    };
+    // Those that keep the budget by their price, then the others by how far they are from it.
+    let mut guesses = guesses(&search.found);
+    let rank = |e: &Estimate| if against(e) <= 1.0 { (false, price(e)) } else { (true, against(e)) };
+    guesses.sort_by(|a, b| {
+        let (a, b) = (rank(&a.1), rank(&b.1));
+        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+    });
+    // The best guess is measured; where it does not keep the budget the next best is.
     let mut chosen = None;
     for (choice, _) in guesses.iter().take(MOST_GUESSES) {
         let estimate = search.measure(choice)?;
@@ -165,7 +195,7 @@ fn search(project: &Project, budget: &Quality, folder: &Path, progress: &mut Pro
         estimate.error_p95_mm,
         estimate.seconds_per_frame
     ));
-    Ok(Resolved { budget: budget.to_string(), settings, estimate })
+    Ok(Resolved { budget: budget.to_string(), shot: shot_hash(project), settings, estimate })
 }
 
 /// What is tried of each setting, with the others in the middle.
@@ -240,7 +270,9 @@ fn pilot(project: &Project, folder: &Path, progress: &mut Progress) -> Result<(P
     let report = Runner::new(project, options, progress)?.run()?;
     let count = |name: &str| -> f64 {
         let counts = report.stages.iter().flat_map(|s| &s.counts);
-        counts.filter(|c| c.0 == &format!("hairs in layer {name}")).map(|c| *c.1 as f64).sum()
+        let of =
+            |kind: &str| counts.clone().find(|c| c.0 == &format!("hairs {kind} in layer {name}").replace("  ", " "));
+        of("needed").or(of("")).map_or(0.0, |c| *c.1 as f64)
     };
     let mut out = project.clone();
     out.shot.value.cache.dir = folder.to_path_buf();

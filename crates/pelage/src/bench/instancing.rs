@@ -84,7 +84,7 @@ fn weights_section(bench: &mut Bench<'_>, known: &Known<'_>) -> Result<Section, 
         let roots = Roots { chart: vec![0; uv.len()], uv, ..Roots::default() };
         Ok(check_weights(&sites, &triangulate(&sites, &[false]), &roots))
     })?;
-    section.row(bench, "bust", || {
+    section.row(bench, "weights/bust", || {
         let g = known()?;
         Ok(check_weights(&g.sites, &g.triangulation, &g.roots))
     })?;
@@ -170,7 +170,7 @@ fn seams_section(bench: &mut Bench<'_>, known: &Known<'_>) -> Result<Section, Er
          the one chart and in the other. They should be one hair: control hairs on the border belong to both charts, and \
          both blend the same two there, so that what is left should be rounding.",
     );
-    section.row(bench, "bust", || {
+    section.row(bench, "seams/bust", || {
         let g = known()?;
         let mesh = &g.skin.mesh;
         let mut pair: [Vec<SurfacePoint>; 2] = Default::default();
@@ -429,7 +429,7 @@ fn answers(weights: &Section, seams: &Section, points: &Section, density: &Secti
     let row =
         |s: &Section, name: &str| s.rows.iter().find(|(n, _)| n == name).map(|(_, v)| v.clone()).unwrap_or_default();
     let at = |v: &Vec<f64>, k: usize| v.get(k).copied().unwrap_or(f64::NAN);
-    let (w, s) = (row(weights, "bust"), row(seams, "bust"));
+    let (w, s) = (row(weights, "weights/bust"), row(seams, "seams/bust"));
     let (blue, random) = (row(density, "blue-noise/2-cm"), row(density, "random/2-cm"));
     let enough = |name: &str, limit: f64| {
         let rows = || points.rows.iter().filter(|(n, _)| n.split('/').next() == Some(name));
@@ -447,7 +447,7 @@ fn answers(weights: &Section, seams: &Section, points: &Section, density: &Secti
             at(&s, 2),
             at(&s, 4)
         ),
-        format!("Points of a hair for an RMS error within a hair's breadth (0.3 mm): {}.", each.join(", ")),
+        format!("Points of a hair for an RMS error below 0.3 mm: {}.", each.join(", ")),
         format!(
             "Counts of hairs in patches of 2 cm are off by {:.1} % RMS in blue noise, by {:.1} % at random: {:.2} and {:.2} of \
              the variance of a Poisson process.",

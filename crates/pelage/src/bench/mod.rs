@@ -232,8 +232,19 @@ pub fn run(studies: &[Study], folder: &Path, quick: bool, progress: &mut Progres
         bench.progress.end(&format!("{total} points"));
         found.push((*study, findings));
         report::write(&found, folder, quick)?;
+        clear_shots(folder);
     }
     Ok(())
+}
+
+/// Removes the shots that studies ran.
+fn clear_shots(folder: &Path) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let ours = entry.file_name().to_str().is_some_and(|n| n == "shots" || n.starts_with("shot-"));
+        if ours && entry.path().is_dir() {
+            let _ = std::fs::remove_dir_all(entry.path());
+        }
+    }
 }
 
 /// Names of the points of a study.
@@ -251,7 +262,9 @@ pub fn one(point: &str, folder: &Path, quick: bool, progress: &mut Progress) -> 
     let Some(study) = STUDIES.iter().find(of) else { return Ok(None) };
     let mut bench = Bench::aside(folder, quick, Mode::Only(point), progress);
     bench.study = study.name;
-    match (study.run)(&mut bench) {
+    let done = (study.run)(&mut bench);
+    clear_shots(folder);
+    match done {
         Err(Error::Stopped) => Ok(bench.asked.pop().map(|(_, values)| values)),
         other => other.map(|_| None),
     }

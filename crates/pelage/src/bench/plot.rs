@@ -33,7 +33,8 @@ pub struct Plot<'a> {
     pub series: Vec<Series>,
 }
 
-const COLOURS: [&str; 6] = ["#1b6ca8", "#c8501e", "#2e8540", "#7b3fa0", "#a08000", "#555555"];
+const COLOURS: [&str; 10] =
+    ["#1b6ca8", "#c8501e", "#2e8540", "#7b3fa0", "#a08000", "#555555", "#d81b60", "#00a3a3", "#8d5a3b", "#86b300"];
 const WIDTH: f64 = 760.0;
 const HEIGHT: f64 = 470.0;
 /// Left, top, right, bottom.

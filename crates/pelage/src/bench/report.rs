@@ -157,9 +157,10 @@ fn csv(found: &[(Study, Findings)]) -> String {
         for s in &findings.sections {
             for (point, values) in &s.rows {
                 for (column, value) in s.columns.iter().zip(values) {
+                    let value = if value.is_nan() { String::new() } else { format!("{value:e}") };
                     let _ = writeln!(
                         out,
-                        "{},{},{},{},{value:e}",
+                        "{},{},{},{},{value}",
                         study.name,
                         quoted(&s.title),
                         quoted(point),

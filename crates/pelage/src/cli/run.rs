@@ -42,6 +42,10 @@ pub fn pictures(a: &PreviewArguments) -> Result<bool, Error> {
         let frames = drawn.iter().copied().chain(framed).collect();
         (Pictures::Sequence(drawn), frames)
     } else if a.turntable {
+        if project.shot.value.skip.camera {
+            let text = "note: hair that the shot's camera does not see is left out (skip.camera): it is missing from other sides";
+            crate::progress::print_line(text);
+        }
         (Pictures::Turntable, [still].into())
     } else {
         (Pictures::Sheet, all.frames.clone().unwrap_or_else(|| sheet.into_iter().chain([still]).collect()))

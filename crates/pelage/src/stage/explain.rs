@@ -47,7 +47,7 @@ impl Runner<'_> {
             stage_report(stage).and_then(|s| s.skipped.get(name).or(s.counts.get(name))).copied().unwrap_or(0)
         };
         let all = of(Stage::Instance, "hairs");
-        let left = of(Stage::Instance, "hairs that the shot needs").max(1) as f64;
+        let left = of(Stage::Instance, "hairs that the shot needs");
         let later: f64 = [Stage::Simulate, Stage::Interpolate, Stage::Shadow, Stage::Export].map(known).iter().sum();
         for name in LEFT_OUT {
             let count = of(Stage::Instance, name);
@@ -55,7 +55,8 @@ impl Runner<'_> {
                 "hairs thinned by distance" => "as many pixels are covered; single pixels differ (bench study lod)",
                 _ => "none on the hair that is left; shadows of hair farther away than skip.margin are missing",
             };
-            let saved = Some(later * count as f64 / left);
+            // Without any hair left nothing is known of what one costs.
+            let saved = (left > 0).then(|| later * count as f64 / left as f64);
             out.push(Skipped::new("instance", name, count, all, saved, error));
         }
         let [asleep, frames] = simulate::SKIPPED.map(|name| of(Stage::Simulate, name));
@@ -66,9 +67,9 @@ impl Runner<'_> {
         let saved = known(Stage::Simulate) * TWIST * plain as f64 / simulated.max(1) as f64;
         out.push(Skipped::new("simulate", "twist of hairs that can't twist", plain, simulated, Some(saved), "none"));
         let shot = &self.project.shot.value;
-        let pairs = (shot.light.len() * self.project.frames.len()) as u64;
+        let frames = || self.project.frames.keys().filter(|f| self.wants(**f));
+        let pairs = (shot.light.len() * frames().count()) as u64;
         let written = |l: usize, f: i32| is_shadowed(self.project, l, f, true) || self.shows(f);
-        let frames = || self.project.frames.keys();
         let lit: usize = (0..shot.light.len()).map(|l| frames().filter(|f| written(l, **f)).count()).sum();
         let each = known(Stage::Shadow) / lit.max(1) as f64;
         let unlit = pairs - lit as u64;

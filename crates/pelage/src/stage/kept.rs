@@ -75,51 +75,55 @@ fn choose(run: &mut Runner<'_>, i: usize, all: &Roots, counts: &mut Counts) -> R
     let skin = groom::skin(run)?;
     let (position, _) = rest_sites(&groom::view(&skin), &all.root, skin.origin());
     let n = all.id.len();
-    let mut left_out = [0u64; LEFT_OUT.len()];
-    let mut keep = vec![true; n];
+    // Why a hair is left out, as `LEFT_OUT` has it; of several reasons the first.
+    let mut why: Vec<Option<usize>> = vec![None; n];
     if let (Some(m), Some(tiles)) = (&skip.mask, &project.mask) {
         let map = read_map(tiles, m, Texel::Value, &mut run.warnings)?;
         let open: Vec<bool> = all.uv.par_iter().map(|uv| map.value(*uv) >= OPEN).collect();
-        keep = around(&position, &open, margin as f32);
-        left_out[0] = keep.iter().filter(|k| !**k).count() as u64;
-    }
-    let mut part = vec![1.0f32; n];
-    if skip.sees() {
-        let found = seen(run, i, all, margin)?;
-        for (h, (sight, pixels)) in found.into_iter().enumerate() {
-            if skip.camera && keep[h] && sight != Sight::Seen {
-                left_out[if sight == Sight::Outside { 1 } else { 2 }] += 1;
-                keep[h] = false;
-            }
-            if let Some(lod) = skip.lod {
-                part[h] = (f64::from(pixels) / lod).clamp(LEAST, 1.0) as f32;
-            }
-        }
+        let near = around(&position, &open, margin as f32);
+        (0..n).filter(|h| !near[*h]).for_each(|h| why[h] = Some(0));
     }
     let mut wider = vec![1.0f32; n];
-    if skip.lod.is_some() {
-        let layer = &project.groom.value.layer[i];
-        let map = layer.density.map().map(|m| run.map(&m, Texel::Value)).transpose()?;
-        let on_off = layer.on_off.as_ref().map(|m| run.map(m, Texel::Value)).transpose()?;
-        let value = layer.density.value * project.cm2_per_unit2();
-        let density = Density { value, map: map.as_ref(), on_off: on_off.as_ref() };
-        for (h, share) in shares(all, &density, skin.area()).into_iter().enumerate() {
-            wider[h] = 1.0 / part[h];
-            if keep[h] && share > part[h] {
-                left_out[3] += 1;
-                keep[h] = false;
+    if skip.sees() {
+        let found = seen(run, i, all, margin)?;
+        let unseen = |sight: Sight| match sight {
+            Sight::Seen => None,
+            Sight::Outside => Some(1),
+            Sight::Hidden => Some(2),
+        };
+        if skip.camera {
+            (0..n).for_each(|h| why[h] = why[h].or(unseen(found[h].0)));
+        }
+        if let Some(lod) = skip.lod {
+            let layer = &project.groom.value.layer[i];
+            let map = layer.density.map().map(|m| run.map(&m, Texel::Value)).transpose()?;
+            let on_off = layer.on_off.as_ref().map(|m| run.map(m, Texel::Value)).transpose()?;
+            let value = layer.density.value * project.cm2_per_unit2();
+            let density = Density { value, map: map.as_ref(), on_off: on_off.as_ref() };
+            for (h, share) in shares(all, &density, skin.area()).into_iter().enumerate() {
+                let part = (f64::from(found[h].1) / lod).clamp(LEAST, 1.0) as f32;
+                wider[h] = 1.0 / part;
+                why[h] = why[h].or((share > part).then_some(3));
             }
         }
     }
-    let wanted = keep.clone();
+    let mut keep: Vec<bool> = why.iter().map(Option::is_none).collect();
     if keep.iter().any(|k| !*k) {
         add_centres(run, i, all, &position, &mut keep)?;
     }
+    let centres: Vec<usize> = (0..n).filter(|h| keep[*h] && why[*h].is_some()).collect();
     // A centre that is there for its clump only is no wider than it was.
-    (0..n).filter(|h| !wanted[*h]).for_each(|h| wider[h] = 1.0);
-    counts.extend(LEFT_OUT.iter().zip(left_out).filter(|(_, n)| *n > 0).map(|(name, n)| ((*name).to_owned(), n)));
-    let centres = keep.iter().zip(&wanted).filter(|(k, w)| **k && !**w).count() as u64;
-    counts.insert("hairs kept as centres of clumps".to_owned(), centres);
+    centres.iter().for_each(|h| wider[*h] = 1.0);
+    for (k, name) in LEFT_OUT.iter().enumerate() {
+        let count = (0..n).filter(|h| !keep[*h] && why[*h] == Some(k)).count() as u64;
+        counts.extend((count > 0).then(|| ((*name).to_owned(), count)));
+    }
+    counts.insert("hairs kept as centres of clumps".to_owned(), centres.len() as u64);
+    let layer = &project.groom.value.layer[i].name;
+    counts.insert(format!("hairs needed in layer {layer}"), keep.iter().filter(|k| **k).count() as u64);
+    if n > 0 && !keep.contains(&true) {
+        run.warnings.push(format!("layer {layer}: [skip] leaves none of its {n} hairs"));
+    }
     Ok(Choice { keep, wider })
 }
 

@@ -288,6 +288,11 @@ impl<'a> Runner<'a> {
         self.plan.steps.iter().filter(|s| s.stage == stage).filter(wanted).cloned().collect()
     }
 
+    /// True if the run is about a frame.
+    pub(super) fn wants(&self, frame: i32) -> bool {
+        self.options.frames.as_ref().is_none_or(|o| o.contains(&frame))
+    }
+
     /// True if a picture of a frame is drawn.
     pub(super) fn shows(&self, frame: i32) -> bool {
         self.options.pictures.show(self.project, frame)
