@@ -184,7 +184,7 @@ fn answer(rows: &[Row], defaults: &[Row]) -> String {
     format!(
         "A released, undamped hair, tip within 1 % of its length at t = 1, 2, 3 sqrt(L / g), cheapest: {}. The default steps (192 \
          a second, here {:.0} a sqrt(L / g)) are off by {few:.2} % with the default 25 segments, and with 50 by {error:.2} % for \
-         {cost:.2} ms, the step alone by {own:.2} %: at 25 segments more steps buy nothing. 40 steps leave {half:.2} % for {more:.2} ms. Order in time, mean over \
+         {cost:.2} ms, the step alone by {own:.2} %. 40 steps leave {half:.2} % for {more:.2} ms. Order in time, mean over \
          steps: rod {:.2}, springs {:.2}, paper {:.2}; the rod's order in space, at the finest steps, {:.2}.",
         each.join("; "),
         default_steps(),
