@@ -61,7 +61,7 @@ fn run(bench: &mut Bench<'_>) -> Result<Findings, Error> {
             (Kind::Masked, true) => 3,
             (Kind::Masked, false) => 8,
             (Kind::View, true) => 10,
-            (Kind::Still, false) => 140,
+            (Kind::Still, false) => 70,
             (_, false) => 35,
             // They take minutes.
             (Kind::Still | Kind::Distant, true) => continue,
