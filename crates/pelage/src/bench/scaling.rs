@@ -159,7 +159,7 @@ fn interpolation(bench: &mut Bench<'_>, bandwidth: f64, findings: &mut Findings)
             line.push((row[0], row[2]));
         }
     }
-    let of = s.rows.iter().filter(|r| r.1[1] == all as f64).next_back().map_or(vec![f64::NAN; 6], |r| r.1.clone());
+    let of = s.rows.iter().rfind(|r| r.1[1] == all as f64).map_or(vec![f64::NAN; 6], |r| r.1.clone());
     findings.answers.push(format!(
         "Interpolation: {:.0} hairs of 12 points in {:.3} s, {:.1} ns a point, {:.0} % of the machine's bandwidth.",
         of[0], of[2], of[3], of[5]

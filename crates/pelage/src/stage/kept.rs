@@ -166,7 +166,7 @@ fn add_centres(
     i: usize,
     all: &Roots,
     position: &[[f32; 3]],
-    keep: &mut Vec<bool>,
+    keep: &mut [bool],
 ) -> Result<(), Error> {
     let layer = &run.project.groom.value.layer[i];
     let hairs = Drawn { id: &all.id, uv: &all.uv, position, seed: u64::from(layer_seed(&layer.name)) };
