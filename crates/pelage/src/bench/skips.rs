@@ -130,7 +130,7 @@ fn write(kind: Kind, per_cm2: u32, frames: i32, folder: &Path, skip: bool) -> Re
         files.push(("maps/mask.png".to_owned(), mask(&skin(&files, "grooms/bust.ply")?, one_side)));
         let skipped = if skip { "[skip]\nmask = { map = \"maps/mask.png\" }\n" } else { "" };
         text(&mut files, "pipeline.toml", &|t| {
-            format!("{skipped}{}", t.replace("1048]", &format!("{last}]")).replace("frame = 1012", "frame = 1004"))
+            format!("{skipped}{}", t.replace("1048]", &format!("{last}]")).replace("frame = 1012", "frame = 1002"))
         });
     } else {
         text(&mut files, "grooms/animal-fur.toml", &|t| {
