@@ -54,6 +54,11 @@ impl Candidates {
     }
 }
 
+/// Rank of a hair among its layer's candidates, in their middle: it is there from a density of this many hairs over the skin on.
+pub fn rank(id: StrandId) -> f64 {
+    (id & 0xffff_ffff) as f64 + 0.5
+}
+
 /// Name of the hair at candidate `index` in a layer. The top bit of `layer_seed` must be 0.
 pub fn strand_id(layer_seed: u32, index: u32) -> StrandId {
     (u64::from(layer_seed) << 32) | u64::from(index)

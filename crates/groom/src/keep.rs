@@ -1,5 +1,6 @@
 //! Hairs that a shot needs, of those that there are: chosen by their roots and ranks, so that what is left is the same hair.
 
+use crate::candidates::rank;
 use crate::instance::{Density, Roots};
 use crate::look::member::Grid;
 use rayon::prelude::*;
@@ -35,10 +36,7 @@ pub fn around(position: &[[f32; 3]], chosen: &[bool], distance: f32) -> Vec<bool
 /// \[N\] shares of the local density from which on each hair is there, in (0, 1]: those at or below a share are what a layer
 /// of that share of the density has. `area` is that of the rest skin, square scene units.
 pub fn shares(roots: &Roots, density: &Density, area: f64) -> Vec<f32> {
-    let share = |(id, uv): (&u64, &[f32; 2])| {
-        let rank = (id & 0xffff_ffff) as f64 + 0.5;
-        (rank / (area * density.at(*uv))) as f32
-    };
+    let share = |(id, uv): (&u64, &[f32; 2])| (rank(*id) / (area * density.at(*uv))) as f32;
     roots.id.par_iter().zip(&roots.uv).map(share).collect()
 }
 

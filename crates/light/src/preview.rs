@@ -54,6 +54,24 @@ pub struct HairView<'a> {
     pub transmittance: &'a [Vec<f32>],
 }
 
+impl<'a> HairView<'a> {
+    /// Hairs with a width along them, all else as by default.
+    pub fn plain(offsets: &'a Offsets, position: &'a [[f32; 3]], origin: [f64; 3], width: &'a [f32]) -> Self {
+        HairView {
+            offsets,
+            position,
+            origin,
+            width,
+            color: &[],
+            opacity: &[],
+            root_normal: &[],
+            shine: &[],
+            side: &[],
+            transmittance: &[],
+        }
+    }
+}
+
 /// What is drawn, and in what light.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene<'a> {

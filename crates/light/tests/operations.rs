@@ -40,18 +40,7 @@ fn pictures_draw_as_many_pieces_and_pixels() {
     let camera = Camera::frame(([-0.2, -0.3, -0.2], [0.2; 3]), [-0.4, -0.2, -1.0], [0.0, 1.0, 0.0], 4.0 / 3.0);
     let lights = studio_lights(&camera);
     let count = |groom: Groom| {
-        let layers = [HairView {
-            offsets: &groom.offsets,
-            position: &groom.position,
-            origin: [0.0; 3],
-            width: &groom.width,
-            color: &[],
-            opacity: &[],
-            root_normal: &[],
-            shine: &[],
-            side: &[],
-            transmittance: &[],
-        }];
+        let layers = [HairView::plain(&groom.offsets, &groom.position, [0.0; 3], &groom.width)];
         let scene = Scene { skin: None, layers: &layers, lights: &lights, background: [0.0; 3] };
         let (_, counts) = render(&scene, &camera, 400, 300, &Settings::default());
         [counts.pieces, counts.pixels]

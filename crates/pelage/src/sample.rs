@@ -12,7 +12,7 @@ use std::path::Path;
 pub type NamedFile = (String, Vec<u8>);
 
 /// Side of the painted maps, texels: a texel is under a millimetre on the bust.
-const MAP_SIZE: usize = 512;
+pub(crate) const MAP_SIZE: usize = 512;
 
 /// Files of a sample shot.
 pub fn files(kind: Sample) -> Vec<NamedFile> {
@@ -115,7 +115,7 @@ fn smooth(low: f64, high: f64, x: f64) -> f32 {
 }
 
 /// An 8-bit PNG, rows from the top; one or three channels.
-fn png(map: &Map) -> Vec<u8> {
+pub(crate) fn png(map: &Map) -> Vec<u8> {
     let texel = |x: f32| (x.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
     let row = map.width * map.channels;
     let data: Vec<u8> = map.data.chunks(row).rev().flatten().map(|x| texel(*x)).collect();

@@ -6,6 +6,7 @@
 //! sides of something thin, and roots on different sides of a parting are combed apart: they never share a clump.
 
 use super::CHUNK;
+use crate::candidates::rank;
 use crate::control::Skin;
 use pelage_geom::curve::closest_on_polyline;
 use pelage_geom::{NONE, StrandId, SurfacePoint, Vec3};
@@ -92,8 +93,7 @@ pub fn sides(partings: &[Vec<Vec3>], near: f64, sites: &Sites) -> Vec<[u64; 2]> 
 pub fn centres(id: &[StrandId], area: f64, density: &dyn Fn(usize) -> f64, open: &[bool]) -> Vec<u32> {
     let is = |h: &u32| {
         let h = *h as usize;
-        let rank = (id[h] & 0xffff_ffff) as f64;
-        open.get(h).copied().unwrap_or(true) && (rank + 0.5) / area <= density(h)
+        open.get(h).copied().unwrap_or(true) && rank(id[h]) / area <= density(h)
     };
     (0..id.len() as u32).filter(is).collect()
 }

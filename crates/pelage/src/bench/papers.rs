@@ -305,18 +305,7 @@ fn drawn(ball: &Ball, hairs: usize, steps: u32) -> Result<Image, Error> {
     let position: Vec<[f32; 3]> = rig.sim.positions().iter().map(|p| p.map(|c| c as f32)).collect();
     // As wide as real hair that covers this much: 100,000 hairs of 80 micrometres, drawn as fewer, not wider than 0.5 mm.
     let width = vec![(100_000.0 / hairs as f32 * 80e-6).min(0.5e-3); position.len()];
-    let view = HairView {
-        offsets: rig.sim.offsets(),
-        position: &position,
-        origin: [0.0; 3],
-        width: &width,
-        color: &[],
-        opacity: &[],
-        root_normal: &[],
-        shine: &[],
-        side: &[],
-        transmittance: &[],
-    };
+    let view = HairView::plain(rig.sim.offsets(), &position, [0.0; 3], &width);
     let skin = SkinView {
         position: &ball.mesh.position,
         triangle: &ball.mesh.triangle,

@@ -104,18 +104,8 @@ pub(super) fn kept(layer: &HairLayer, keep: impl Fn(usize, StrandId) -> bool, wi
 
 /// A layer as it is drawn.
 pub(super) fn view(layer: &HairLayer, origin: [f64; 3]) -> HairView<'_> {
-    HairView {
-        offsets: &layer.offsets,
-        position: &layer.rest,
-        origin,
-        width: &layer.width,
-        color: &layer.color,
-        opacity: &layer.opacity,
-        root_normal: &[],
-        shine: &[],
-        side: &[],
-        transmittance: &[],
-    }
+    let plain = HairView::plain(&layer.offsets, &layer.rest, origin, &layer.width);
+    HairView { color: &layer.color, opacity: &layer.opacity, ..plain }
 }
 
 /// A camera that sees layers of hair from a side.

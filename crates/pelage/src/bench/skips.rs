@@ -3,14 +3,13 @@
 use super::{Bench, Findings, Section, Study};
 use crate::Error;
 use crate::cli::Sample;
-use crate::format::image::png_bytes;
 use crate::format::mcap::read_hair_mcap;
 use crate::format::ply::{mesh_bytes, parse_mesh};
 use crate::progress::Progress;
 use crate::project::Project;
 use crate::sample;
 use crate::stage::{Options, Runner};
-use pelage_geom::{Map, Mesh, Vec3, shapes};
+use pelage_geom::{Mesh, Vec3, shapes};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -127,7 +126,8 @@ fn write(kind: Kind, per_cm2: u32, frames: i32, folder: &Path, skip: bool) -> Re
             t.replace("density = { value = 24.0", &format!("density = {{ value = {per_cm2}.0"))
         });
         let one_side = |p: Vec3, _: Vec3| if p.x > 5.0 { 1.0 } else { 0.0 };
-        files.push(("maps/mask.png".to_owned(), mask(&skin(&files, "grooms/bust.ply")?, one_side)));
+        let map = shapes::paint(&skin(&files, "grooms/bust.ply")?, sample::MAP_SIZE, one_side);
+        files.push(("maps/mask.png".to_owned(), sample::png(&map)));
         let skipped = if skip { "[skip]\nmask = { map = \"maps/mask.png\" }\n" } else { "" };
         text(&mut files, "pipeline.toml", &|t| {
             format!("{skipped}{}", t.replace("1048]", &format!("{last}]")).replace("frame = 1012", "frame = 1002"))
@@ -165,25 +165,12 @@ fn write(kind: Kind, per_cm2: u32, frames: i32, folder: &Path, skip: bool) -> Re
         );
         files.push(("pipeline.toml".to_owned(), shot.into_bytes()));
     }
-    for (name, bytes) in files {
-        let path = folder.join(name);
-        let parent = path.parent().expect("a file in a folder");
-        std::fs::create_dir_all(parent).map_err(Error::disk(parent))?;
-        std::fs::write(&path, bytes).map_err(Error::disk(&path))?;
-    }
-    Ok(())
+    sample::write(folder, &files)
 }
 
 fn skin(files: &[(String, Vec<u8>)], name: &str) -> Result<Mesh, Error> {
     let (_, bytes) = files.iter().find(|f| f.0 == name).expect("the sample's skin");
     Ok(parse_mesh(Path::new(name), bytes)?.mesh)
-}
-
-/// A map of 0 and 1.
-fn mask(mesh: &Mesh, of: impl Fn(Vec3, Vec3) -> f32 + Sync) -> Vec<u8> {
-    let map: Map = shapes::paint(mesh, 512, of);
-    let rows = map.data.chunks(map.width).rev().flatten();
-    png_bytes(map.width, map.height, 1, &rows.map(|x| (x * 255.0) as u8).collect::<Vec<u8>>())
 }
 
 /// The fox's tail and hind part at a frame: they swing to the sides, the rest stays where it is.

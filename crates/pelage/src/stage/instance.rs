@@ -94,17 +94,34 @@ pub fn grown(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
     }
 }
 
+/// What makes a layer's hairs exist, with its maps.
+pub(super) struct LayerDensity {
+    value: f64,
+    map: Option<TiledMap>,
+    on_off: Option<TiledMap>,
+}
+
+impl LayerDensity {
+    /// As hairs are grown by it.
+    pub fn view(&self) -> Density<'_> {
+        Density { value: self.value, map: self.map.as_ref(), on_off: self.on_off.as_ref() }
+    }
+}
+
+/// Reads what makes a layer's hairs exist.
+pub(super) fn density(run: &mut Runner<'_>, i: usize) -> Result<LayerDensity, Error> {
+    let layer = &run.project.groom.value.layer[i];
+    let map = feature_map(run, &layer.density)?;
+    let on_off = layer.on_off.as_ref().map(|m| run.map(m, Texel::Value)).transpose()?;
+    Ok(LayerDensity { value: layer.density.value * run.project.cm2_per_unit2(), map, on_off })
+}
+
 fn grow(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
     let skin = groom::skin(run)?;
     let mut candidates = candidates(run, i)?;
     let layer = &run.project.groom.value.layer[i];
-    let map = feature_map(run, &layer.density)?;
-    let on_off = layer.on_off.as_ref().map(|m| run.map(m, Texel::Value)).transpose()?;
-    let density = Density {
-        value: layer.density.value * run.project.cm2_per_unit2(),
-        map: map.as_ref(),
-        on_off: on_off.as_ref(),
-    };
+    let maps = density(run, i)?;
+    let density = maps.view();
     let seed = layer_seed(&layer.name);
     let needed = density.needed_candidates(skin.area());
     if needed > candidates.root.len() {

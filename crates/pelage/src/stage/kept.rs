@@ -8,7 +8,7 @@ use super::{What, clumps, groom, instance, layer_seed, preview};
 use crate::Error;
 use crate::format::ply::Column;
 use pelage_geom::Vec3;
-use pelage_groom::instance::{Density, Roots};
+use pelage_groom::instance::Roots;
 use pelage_groom::interpolate::root_positions;
 use pelage_groom::keep::{around, kept, shares};
 use pelage_groom::look::member::rest_sites;
@@ -95,12 +95,8 @@ fn choose(run: &mut Runner<'_>, i: usize, all: &Roots, counts: &mut Counts) -> R
             (0..n).for_each(|h| why[h] = why[h].or(unseen(found[h].0)));
         }
         if let Some(lod) = skip.lod {
-            let layer = &project.groom.value.layer[i];
-            let map = layer.density.map().map(|m| run.map(&m, Texel::Value)).transpose()?;
-            let on_off = layer.on_off.as_ref().map(|m| run.map(m, Texel::Value)).transpose()?;
-            let value = layer.density.value * project.cm2_per_unit2();
-            let density = Density { value, map: map.as_ref(), on_off: on_off.as_ref() };
-            for (h, share) in shares(all, &density, skin.area()).into_iter().enumerate() {
+            let density = instance::density(run, i)?;
+            for (h, share) in shares(all, &density.view(), skin.area()).into_iter().enumerate() {
                 let part = (f64::from(found[h].1) / lod).clamp(LEAST, 1.0) as f32;
                 wider[h] = 1.0 / part;
                 why[h] = why[h].or((share > part).then_some(3));
@@ -132,7 +128,11 @@ fn seen(run: &mut Runner<'_>, i: usize, all: &Roots, margin: f64) -> Result<Vec<
     let project = run.project;
     let skin = groom::skin(run)?;
     let length = instance::feature(run, What::Length(i), i, all)?;
-    let width = instance::feature(run, What::Width(i), i, all)?;
+    // Only distance asks how wide hairs are.
+    let width = match project.shot.value.skip.lod {
+        Some(_) => instance::feature(run, What::Width(i), i, all)?,
+        None => Vec::new(),
+    };
     let unit = project.shot.value.shot.meters_per_unit;
     let size = project.shot.value.preview.size.map(|s| s as usize);
     let origin = Vec3::from(skin.origin());
@@ -146,8 +146,10 @@ fn seen(run: &mut Runner<'_>, i: usize, all: &Roots, margin: f64) -> Result<Vec<
         found.par_iter_mut().enumerate().for_each(|(h, (best, pixels))| {
             let centre = origin + Vec3::from(root[h].map(f64::from));
             let reach = f64::from(length[h]) * REACH;
-            let width = f64::from(width[h]) * 1e-6 / unit;
-            *pixels = pixels.max(depths.pixels(centre, reach, width) as f32);
+            if let Some(width) = width.get(h) {
+                let width = f64::from(*width) * 1e-6 / unit;
+                *pixels = pixels.max(depths.pixels(centre, reach, width) as f32);
+            }
             if *best != Sight::Seen {
                 match depths.sight(centre, reach + margin) {
                     Sight::Outside => {}

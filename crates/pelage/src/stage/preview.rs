@@ -380,18 +380,8 @@ fn draw(run: &mut Runner<'_>, drawn: &Drawn, seen: &Seen) -> Result<Image, Error
 }
 
 fn view<'a>(layer: &'a HairLayer, strands: &'a Strands, origin: [f64; 3]) -> HairView<'a> {
-    HairView {
-        offsets: &layer.offsets,
-        position: &strands.hairs.position,
-        origin,
-        width: &strands.width,
-        color: &layer.color,
-        opacity: &strands.opacity,
-        root_normal: &strands.normal,
-        shine: &[],
-        side: &[],
-        transmittance: &[],
-    }
+    let plain = HairView::plain(&layer.offsets, &strands.hairs.position, origin, &strands.width);
+    HairView { color: &layer.color, opacity: &strands.opacity, root_normal: &strands.normal, ..plain }
 }
 
 /// Draws a column of the hairs as colours, with a legend.
