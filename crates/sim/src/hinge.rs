@@ -17,8 +17,8 @@ pub(crate) struct Edge<L> {
 #[inline(always)]
 pub(crate) fn edge<L: Lanes>(a: L3<L>, b: L3<L>) -> Edge<L> {
     let e = sub3(b, a);
-    // Edges of no length get no direction, and no NaN.
-    let length = dot(e, e).max(L::splat(1e-60)).sqrt();
+    // An edge of no length has no direction: that is not a number, and its strand is held.
+    let length = dot(e, e).sqrt();
     let inverse = L::splat(1.0) / length;
     Edge { t: scale3(e, inverse), inverse, length }
 }

@@ -495,7 +495,9 @@ pub fn stand<L: Lanes>(
         let c = [lever(0), lever(1), lever(2)];
         let f = mul_add3(e1.t, torque * e1.inverse, neg_mul_add3(e1.t, tension, f));
         let (c12, c20, c01) = (cross(c[1], c[2]), cross(c[2], c[0]), cross(c[0], c[1]));
-        let inverse = on / L::if_gt(on, zero, dot(c[0], c12), one);
+        // A hinge folded back onto itself has no lever to bear anything with.
+        let volume = dot(c[0], c12);
+        let inverse = L::if_gt(on * volume * volume, zero, on / volume, zero);
         let moment = [dot(f, c12) * inverse, dot(f, c20) * inverse, dot(f, c01) * inverse];
         let e = &mut elastic[i];
         let k = [L::load(&e.bend), L::load(&e.bend), L::load(&e.twist)];

@@ -6,7 +6,8 @@ use pelage_sim::stress::{CASES, Measures};
 fn run(model: Model, name: &str) {
     let name = name.replace('_', "-");
     let case = CASES.iter().find(|c| c.name == name).expect("a case of this name");
-    let Measures { all, .. } = case.once(model);
+    // Of contact, what one strand leaves for the next in a thread's buffers shows on several threads only.
+    let Measures { all, .. } = if name == "shaken-body" { case.measure(model) } else { case.once(model) };
     for m in &all {
         println!("{model:?} {name:22} {:48} {:12.3e} <= {:9.3e} {}", m.what, m.value, m.bound, m.holds());
     }
@@ -38,10 +39,10 @@ macro_rules! cases {
 
 cases! {
     rods of Rod: violent_skin long_steps short_steps teleport stiffness masses air one_segment no_length colinear
-        two_thousand_segments crushed inverted born_inside flat_body shaken_body storm gravity root_no_number
-        input_no_number span_no_number skin_no_number denormals;
+        two_thousand_segments crushed inverted born_inside flat_body shaken_body thorns storm gravity standing
+        root_no_number input_no_number span_no_number skin_no_number denormals;
     springs of Springs: violent_skin long_steps short_steps teleport stiffness masses air one_segment no_length colinear
-        two_thousand_segments crushed inverted born_inside flat_body shaken_body storm gravity root_no_number
-        input_no_number span_no_number skin_no_number denormals;
+        two_thousand_segments crushed inverted born_inside flat_body shaken_body thorns storm gravity standing
+        root_no_number input_no_number span_no_number skin_no_number denormals;
     paper of Paper: nine_steps;
 }

@@ -1,12 +1,9 @@
 //! The cases.
 
 use super::rig::{hair, settings, tuft};
-use super::{Case, Measures, inputs, paper};
+use super::{Case, Measures, bodies, inputs, paper};
 use crate::rig::{FRAME, Rig, length, still, turned};
-use crate::{
-    Body, Ellipsoid, Exact, Field, FieldSettings, Material, Model, Part, Rigid, Settings, Shape, SimError, Vec3, Wind,
-};
-use pelage_geom::{Bvh, Mesh, Topology, shapes};
+use crate::{Body, Material, Model, Rigid, Settings, SimError, Vec3, Wind};
 
 pub(super) type Done = Result<(), SimError>;
 
@@ -23,7 +20,7 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "long-steps",
-        about: "the same in steps of a frame, a twelfth of a second and a second",
+        about: "the same in steps of a frame, a twelfth of a second and a second; gravity from the side at once",
         models: BOTH,
         run: long_steps,
     },
@@ -55,7 +52,7 @@ pub const CASES: &[Case] = &[
     Case { name: "one-segment", about: "hairs of one point, one segment and two", models: BOTH, run: one_segment },
     Case {
         name: "no-length",
-        about: "points that coincide at root, tip and everywhere, nanometre and denormal segments",
+        about: "points that coincide or nearly so at root, tip and everywhere, nanometre and denormal segments",
         models: BOTH,
         run: no_length,
     },
@@ -73,18 +70,24 @@ pub const CASES: &[Case] = &[
         models: BOTH,
         run: inverted,
     },
-    Case { name: "born-inside", about: "hair that grows through a solid ball", models: BOTH, run: born_inside },
+    Case { name: "born-inside", about: "hair that grows through a solid ball", models: BOTH, run: bodies::born_inside },
     Case {
         name: "flat-body",
         about: "a body with faces of no area, faces twice, and hair on it",
         models: BOTH,
-        run: flat_body,
+        run: bodies::flat_body,
     },
     Case {
         name: "shaken-body",
         about: "a ball that shakes ten times as hard as a head can",
         models: BOTH,
-        run: shaken_body,
+        run: bodies::shaken_body,
+    },
+    Case {
+        name: "thorns",
+        about: "hair that falls onto thorns finer than the body's field",
+        models: BOTH,
+        run: bodies::thorns,
     },
     Case { name: "storm", about: "wind of 10,000 m/s, turned round every frame", models: BOTH, run: storm },
     Case {
@@ -92,6 +95,12 @@ pub const CASES: &[Case] = &[
         about: "none, 1e-300 to 1e5 m/s2, from all sides, turned over at once",
         models: BOTH,
         run: gravity,
+    },
+    Case {
+        name: "standing",
+        about: "hair of 30 cm that stands up and sticks out, nudged: soft as it is, it would fall",
+        models: BOTH,
+        run: standing,
     },
     Case {
         name: "root-no-number",
@@ -125,7 +134,7 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "nine-steps",
-        about: "the paper's nine steps: at rest, shaken, blown up and back",
+        about: "the paper's nine steps: at rest, shaken, blown up and back; tips that are no numbers",
         models: NINE,
         run: paper::nine_steps,
     },
@@ -199,6 +208,24 @@ fn long_steps(model: Model, m: &mut Measures) -> Done {
             abused(model, m, skin, seconds, Some(1))?;
         }
     }
+    toppled(model, m)
+}
+
+/// Gravity comes from the side at once: long steps must go where short ones do.
+fn toppled(model: Model, m: &mut Measures) -> Done {
+    let rig = |substeps: u32| -> Result<Rig, SimError> {
+        let mut rig = Rig::new(&tuft(), &Settings { substeps: Some(substeps), ..settings(model) })?;
+        rig.gravity = [9.81, 0.0, 0.0];
+        Ok(rig)
+    };
+    let (mut long, mut short) = (rig(1)?, rig(160)?);
+    for _ in 0..3 {
+        long.steps(1, 1.0 / 12.0)?;
+        short.steps(1, 1.0 / 12.0)?;
+        let apart = (0..long.hairs.len()).map(|h| long.apart(&short, h)).fold(0.0, f64::max);
+        m.most("way from where short steps take it, m", apart, 0.02);
+    }
+    long.digest(m);
     Ok(())
 }
 
@@ -279,6 +306,8 @@ fn degenerate(model: Model, m: &mut Measures, cases: &[Vec<[f64; 3]>]) -> Done {
     for bad in cases {
         for sag_free in [true, false] {
             let hairs = [good.clone(), bad.clone()];
+            // Long enough for numbers to tell its points apart.
+            let able = length(bad) > 1e-6;
             let settings = Settings { sag_free, ..settings(model) };
             // Two thousand points take a second a step.
             let (frames, seconds) = if bad.len() > 100 { (1, FRAME / 32.0) } else { (3, FRAME) };
@@ -288,6 +317,9 @@ fn degenerate(model: Model, m: &mut Measures, cases: &[Vec<[f64; 3]>]) -> Done {
                     let t = rig.time;
                     rig.go(seconds, &move |f| shaken_10g(t + f * seconds), &Body::default(), None)?;
                     rig.check(m);
+                    if able {
+                        rig.check_held(m);
+                    }
                 }
                 Ok(rig)
             };
@@ -295,7 +327,7 @@ fn degenerate(model: Model, m: &mut Measures, cases: &[Vec<[f64; 3]>]) -> Done {
             let alone = shake(&hairs[..1], m)?;
             let apart = rig.apart(&alone, 0);
             m.most("what a neighbour notices of it, m", apart, 0.0);
-            if length(bad) > 1e-6 && bad.len() <= 100 {
+            if able && bad.len() <= 100 {
                 rig.calms(m, 24, 0.5)?;
                 rig.check_held(m);
             }
@@ -321,6 +353,7 @@ fn no_length(model: Model, m: &mut Measures) -> Done {
         Rig::new(&[vec![ROOT.into(); 10], tuft()[0].clone()], &Settings { segments: Some(8), ..settings(model) })?;
     rig.steps(2, FRAME)?;
     rig.check(m);
+    gaps(model, m)?;
     degenerate(
         model,
         m,
@@ -334,6 +367,29 @@ fn no_length(model: Model, m: &mut Measures) -> Done {
             hair(ROOT, 2e-5, 10, 0.0),
         ],
     )
+}
+
+/// Points less than a nanometre apart are one point. Ten nanometres are a segment for rods; springs, which can't bear it,
+/// ride with their root.
+fn gaps(model: Model, m: &mut Measures) -> Done {
+    let mut stopped = 0;
+    let mut shaken = |at: &[f64]| -> Result<Vec<Vec3>, SimError> {
+        let hair = at.iter().map(|y| [0.0, -y, 0.0]).collect();
+        let mut rig = Rig::new(&[hair], &Settings { sag_free: false, ..settings(model) })?;
+        for _ in 0..3 {
+            let t = rig.time;
+            rig.go(FRAME, &move |f| shaken_10g(t + f * FRAME), &Body::default(), None)?;
+            stopped += rig.last.stopped.len();
+        }
+        Ok(rig.hair(0))
+    };
+    let close = shaken(&[0.0, 1e-10, 0.05, 0.05, 0.1])?;
+    let one = shaken(&[0.0, 0.05, 0.1])?;
+    shaken(&[0.0, 0.05, 0.05 + 1e-8, 0.1])?;
+    let apart = [(0, 0), (1, 0), (2, 1), (3, 1), (4, 2)].map(|(a, b): (usize, usize)| (close[a] - one[b]).norm());
+    m.most("way from the same hair without points too close, m", apart.into_iter().fold(0.0, f64::max), 0.0);
+    m.most("strands stopped for their short segments", stopped as f64, 0.0);
+    Ok(())
 }
 
 fn colinear(model: Model, m: &mut Measures) -> Done {
@@ -395,118 +451,6 @@ fn inverted(model: Model, m: &mut Measures) -> Done {
     released(model, m, &natural, &mirrored, 0.02)
 }
 
-/// A ball of radius 9 cm as a solid.
-pub(super) struct Ball {
-    pub(super) mesh: Mesh,
-    pub(super) bvh: Bvh,
-    pub(super) field: Field,
-}
-
-pub(super) fn ball(change: impl Fn(&mut Mesh)) -> Ball {
-    let mut mesh = shapes::cube_sphere(24, 0.09);
-    change(&mut mesh);
-    let topology = Topology::new(&mesh);
-    let bvh = Bvh::build(&mesh.position, &mesh.triangle, &topology);
-    let field = Field::build(&mesh.position, &mesh.triangle, &topology, &bvh, &FieldSettings::default(), None);
-    Ball { mesh, bvh, field }
-}
-
-impl Ball {
-    /// Moves hairs on with the ball, and measures how deep free points are within it at the end.
-    pub(super) fn go(
-        &self,
-        rig: &mut Rig,
-        m: &mut Measures,
-        frames: usize,
-        motion: &(dyn Fn(f64) -> Rigid + Sync),
-        deep: bool,
-    ) -> Done {
-        for _ in 0..frames {
-            let t = rig.time;
-            let at = move |f: f64| motion(t + f * FRAME);
-            let exact = Exact { bvh: &self.bvh, triangle: &self.mesh.triangle, velocity: None };
-            let part = Part { motion: &at, shape: Shape::Field(&self.field), exact: Some(exact) };
-            let body = Body { parts: vec![part], seconds: FRAME };
-            rig.go(FRAME, &at, &body, None)?;
-            rig.check(m);
-            let end = body.at(1.0);
-            let depth = |p: &Vec3| end.exact(*p, 0.0).map_or(0.0, |hit| -hit.distance);
-            let free = (0..rig.hairs.len()).flat_map(|h| rig.hair(h).into_iter().skip(2));
-            let deepest = free.map(|p| depth(&p)).fold(0.0, f64::max);
-            if !deep {
-                m.most("deepest point in the body, m", deepest, 1e-4);
-            }
-        }
-        rig.digest(m);
-        Ok(())
-    }
-}
-
-/// Hairs that stand on the ball and lie around it.
-pub(super) fn on_ball(count: usize) -> Vec<Vec<[f64; 3]>> {
-    let of = |k: usize| {
-        let (around, up) = (2.4 * k as f64, 0.3 + 0.65 * (k as f64 + 0.5) / count as f64);
-        let flat = (1.0 - up * up).sqrt();
-        let n = Vec3::new(flat * libm::cos(around), up, flat * libm::sin(around));
-        let down = (-Vec3::y() + n * n.y).normalize();
-        let at = |s: f64| (n * libm::cos(s / 0.09) + down * libm::sin(s / 0.09)) * (0.09 * (1.0 + 0.4 * s));
-        (0..25).map(|i| at(0.15 * f64::from(i) / 24.0).into()).collect()
-    };
-    (0..count).map(of).collect()
-}
-
-fn born_inside(model: Model, m: &mut Measures) -> Done {
-    let ball = ball(|_| {});
-    // Straight through the middle, along a chord, and from inside out.
-    let through =
-        |from: Vec3, to: Vec3| (0..=24).map(|i| (from + (to - from) * (f64::from(i) / 24.0)).into()).collect();
-    let hairs: Vec<Vec<[f64; 3]>> = vec![
-        through(Vec3::new(0.0, 0.09, 0.0), Vec3::new(0.0, -0.12, 0.0)),
-        through(Vec3::new(0.06, 0.067, 0.0), Vec3::new(0.06, -0.1, 0.0)),
-        through(Vec3::new(0.0, 0.0, 0.08), Vec3::new(0.0, 0.02, 0.2)),
-    ];
-    let mut rig = Rig::new(&hairs, &settings(model))?;
-    ball.go(&mut rig, m, 12, &still, true)?;
-    rig.check_held(m);
-    m.most("speed while it comes out, m/s", rig.fastest(), 5.0);
-    Ok(())
-}
-
-fn flat_body(model: Model, m: &mut Measures) -> Done {
-    let ball = ball(|mesh| {
-        let faces = mesh.triangle.len();
-        for k in (0..faces).step_by(7) {
-            let [a, b, c] = mesh.triangle[k];
-            mesh.triangle.extend([[a, a, b], [a, b, b], [c, c, c], [a, b, c]]);
-            let (uv, face) = (mesh.corner_uv[k], mesh.face[k]);
-            mesh.corner_uv.extend([uv; 4]);
-            mesh.face.extend([face; 4]);
-        }
-    });
-    let mut rig = Rig::new(&on_ball(16), &settings(model))?;
-    ball.go(&mut rig, m, 12, &|t| turned(Vec3::new(0.2, 1.0, 0.0), libm::sin(6.0 * t)), false)?;
-    rig.check_held(m);
-    // An ellipsoid of no thickness.
-    let flat: Vec<[f64; 3]> = ball.mesh.position.iter().map(|p| [p[0], 0.0, p[2]]).collect();
-    let Some(flat) = Ellipsoid::fit(&flat, &ball.mesh.triangle) else { return Ok(()) };
-    let mut rig = Rig::new(&on_ball(16), &settings(model))?;
-    for _ in 0..6 {
-        let part = Part { motion: &still, shape: Shape::Ellipsoid(&flat), exact: None };
-        rig.go(FRAME, &still, &Body { parts: vec![part], seconds: FRAME }, None)?;
-        rig.check(m);
-    }
-    rig.digest(m);
-    Ok(())
-}
-
-fn shaken_body(model: Model, m: &mut Measures) -> Done {
-    let ball = ball(|_| {});
-    let mut rig = Rig::new(&on_ball(24), &settings(model))?;
-    ball.go(&mut rig, m, 12, &|t| turned(Vec3::new(0.2, 1.0, 0.0), libm::sin(63.0 * t)), false)?;
-    rig.check_held(m);
-    Ok(())
-}
-
 fn storm(model: Model, m: &mut Measures) -> Done {
     let mut rig = Rig::new(&tuft(), &settings(model))?;
     for frame in 0..8 {
@@ -533,5 +477,23 @@ fn gravity(model: Model, m: &mut Measures) -> Done {
             rig.digest(m);
         }
     }
+    Ok(())
+}
+
+fn standing(model: Model, m: &mut Measures) -> Done {
+    let towards = [Vec3::x(), Vec3::y(), Vec3::new(0.7, 0.7, 0.0), Vec3::new(0.2, 1.0, 0.0)];
+    let hairs = towards.map(|d| (0..=12).map(|i| (d * (0.025 * f64::from(i))).into()).collect::<Vec<[f64; 3]>>());
+    let mut rig = Rig::new(&hairs, &settings(model))?;
+    let nudge = |f: f64| Rigid { translation: [1e-3 * libm::sin(std::f64::consts::TAU * f); 3], ..Rigid::default() };
+    rig.go(FRAME, &nudge, &Body::default(), None)?;
+    for _ in 0..36 {
+        rig.steps(1, FRAME)?;
+        rig.check(m);
+        let groomed = |h: usize| rig.hair(h).into_iter().zip(&rig.hairs[h]).map(|(a, b)| (a - Vec3::from(*b)).norm());
+        let off = (0..rig.hairs.len()).flat_map(groomed).fold(0.0, f64::max);
+        m.most("way from where it was groomed, m", off, 2e-3);
+    }
+    rig.check_held(m);
+    rig.digest(m);
     Ok(())
 }

@@ -3,6 +3,7 @@
 //! A case runs a strand model through something that no shot should contain and measures the worst of it. Every case is run
 //! on one thread and on several, and must give the same bytes.
 
+mod bodies;
 mod cases;
 mod inputs;
 mod paper;

@@ -1,7 +1,9 @@
 //! A case of the paper's nine steps, which promise less than the robust integrator.
 
 use super::Measures;
-use super::cases::{Done, ball, on_ball, shaken_10g};
+use super::bodies::{ball, on_ball};
+use super::cases::{Done, shaken_10g};
+use super::inputs::bad_tip;
 use super::rig::{settings, tuft};
 use crate::rig::{FRAME, Rig, length, turned};
 use crate::{Body, Model, Settings, Vec3};
@@ -16,7 +18,8 @@ pub fn nine_steps(model: Model, m: &mut Measures) -> Done {
     }
     let ball = ball(|_| {});
     let mut rig = Rig::new(&on_ball(8), &settings(model))?;
-    ball.go(&mut rig, m, 6, &|t| turned(Vec3::y(), 0.3 * libm::sin(6.0 * t)), true)
+    ball.go(&mut rig, m, 6, &|t| turned(Vec3::y(), 0.3 * libm::sin(6.0 * t)), None)?;
+    bad_tip(model, m, f64::NAN)
 }
 
 /// Groomed hair at rest stays so: there is nothing but gravity.
