@@ -24,8 +24,8 @@ pub(super) fn ball(change: impl Fn(&mut Mesh)) -> Ball {
 }
 
 impl Ball {
-    /// Moves hairs on with the ball. With `pushed`, measures how deep free points are within it at the end of a frame, and how
-    /// many were deeper before the mesh pushed them out, which may be as many as this.
+    /// Moves hairs on with the ball. With `pushed`, measures how deep free points are within it at the end of a frame,
+    /// and how many the mesh had to push out there, which may be as many as this.
     pub(super) fn go(
         &self,
         rig: &mut Rig,

@@ -369,8 +369,8 @@ fn no_length(model: Model, m: &mut Measures) -> Done {
     )
 }
 
-/// Points less than a nanometre apart are one point. Ten nanometres are a segment for rods; springs, which can't bear it,
-/// ride with their root.
+/// Points less than a nanometre apart are one point. Ten nanometres are a segment for rods; springs, which can't bear
+/// it, ride with their root.
 fn gaps(model: Model, m: &mut Measures) -> Done {
     let mut stopped = 0;
     let mut shaken = |at: &[f64]| -> Result<Vec<Vec3>, SimError> {
