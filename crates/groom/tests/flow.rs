@@ -89,7 +89,7 @@ fn leaks(n: usize, wall: f64, up: f64, guarded: bool) -> f64 {
     let fast = Fast::new(body.flow(&elements, &strength), OPENING);
     let edge = (2.0 * body.panels()[0].area).sqrt();
     let above = |p: Vec3| bvh.closest(p, f64::INFINITY).expect("a mesh").position + p * (up * edge);
-    let roots = (0..400).map(on_sphere).filter(|p| p.y > 0.1);
+    let roots = (0..250).map(on_sphere).filter(|p| p.y > 0.1);
     let starts: Vec<Start> = roots.map(|p| Start { at: above(p), direction: p, length: 3.0 }).collect();
     let guard = guarded.then_some(Guard { surface: &bvh, clearance: 0.002 });
     let lines = trace(|_, p| fast.velocity(p), &starts, &TRACE, guard.as_ref());
@@ -155,4 +155,22 @@ fn the_grid_is_near_the_sum() {
     assert!(Grid::fill(&fast, Vec3::zeros(), Vec3::repeat(1.0), 0.0).is_err());
     assert!(Grid::fill(&fast, Vec3::zeros(), Vec3::repeat(1.0), 1e-5).is_err());
     assert!(Grid::fill(&fast, Vec3::zeros(), Vec3::repeat(f64::NAN), 0.1).is_err());
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bytes() {
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a thread pool");
+        pool.install(|| {
+            let body = body(&cube_sphere(4, 1.0));
+            let elements = stream();
+            let strength = body.solve(&elements, &vec![0.2; body.panels().len()]).expect("strengths");
+            let fast = Fast::new(body.flow(&elements, &strength), OPENING);
+            let grid = Grid::fill(&fast, Vec3::repeat(-1.5), Vec3::repeat(1.5), 0.2).expect("a grid");
+            let starts: Vec<Start> =
+                (0..60).map(on_sphere).map(|p| Start { at: p, direction: p, length: 3.0 }).collect();
+            trace(|_, p| grid.velocity(p), &starts, &TRACE, None)
+        })
+    };
+    assert!(run(1) == run(3));
 }

@@ -21,6 +21,8 @@ pub enum FlowError {
         /// The triangle.
         triangle: usize,
     },
+    /// A closed mesh whose triangles are clockwise seen from outside.
+    InsideOut,
     /// Two panels that lie on each other, or another surface on which the normal velocities contradict each other.
     Singular,
     /// Not one normal velocity a panel.
@@ -50,6 +52,7 @@ impl fmt::Display for FlowError {
                 write!(f, "triangle {triangle} of the body names a vertex that is not there")
             }
             FlowError::NoArea { triangle } => write!(f, "triangle {triangle} of the body has no area"),
+            FlowError::InsideOut => write!(f, "the triangles of the body face inward"),
             FlowError::Singular => {
                 write!(f, "the flow through the panels of the body can't be chosen freely: some lie on each other")
             }
@@ -90,6 +93,9 @@ impl Body {
             Panel::new(pelage_geom::mesh::corners(position, *tri)).ok_or(FlowError::NoArea { triangle: t })
         };
         let panel: Vec<Panel> = triangle.iter().enumerate().map(panel).collect::<Result<_, _>>()?;
+        if is_inside_out(&panel) {
+            return Err(FlowError::InsideOut);
+        }
         let factored = influence(&panel).lu();
         let pivot = factored.lu_internal().diagonal().abs();
         // The diagonal is 1/2; a sound body has pivots of 0.1 to 1.
@@ -126,6 +132,15 @@ impl Body {
     pub fn flow<'a>(&'a self, elements: &'a [Element], strength: &'a [f64]) -> Flow<'a> {
         Flow { elements, panels: &self.panel, strength }
     }
+}
+
+/// True for a closed mesh of negative volume: the flow within it can't go through it as it likes.
+fn is_inside_out(panel: &[Panel]) -> bool {
+    let area: f64 = panel.iter().map(|p| p.area).sum();
+    let facing = panel.iter().fold(Vec3::zeros(), |s, p| s + p.normal * p.area);
+    let origin = panel[0].centre;
+    let volume: f64 = panel.iter().map(|p| (p.centre - origin).dot(&p.normal) * p.area).sum();
+    facing.norm() < 1e-6 * area && volume < 0.0
 }
 
 /// The matrix, its columns in parallel.
@@ -202,6 +217,11 @@ mod tests {
         let one = Body::new(&position, &[[0, 1, 2]]).expect("a panel");
         assert_eq!(one.solve(&[], &[]).err(), Some(FlowError::WrongCount { panels: 1, given: 0 }));
         assert_eq!(one.solve(&[], &[f64::NAN]).err(), Some(FlowError::NotFinite { panel: 0 }));
+        let mesh = cube_sphere(2, 1.0);
+        let turned: Vec<[u32; 3]> = mesh.triangle.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
+        assert_eq!(Body::new(&mesh.position, &turned).err(), Some(FlowError::InsideOut));
+        let twice = [mesh.triangle.clone(), mesh.triangle.clone()].concat();
+        assert_eq!(Body::new(&mesh.position, &twice).err(), Some(FlowError::Singular));
         assert!(FlowError::NoArea { triangle: 3 }.to_string().contains("triangle 3"));
     }
 }

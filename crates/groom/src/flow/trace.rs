@@ -233,7 +233,7 @@ impl Keeper<'_> {
         for _ in 0..12 {
             let Some((distance, out)) = guard.nearest(p) else { return p };
             if distance >= clearance * (1.0 - 1e-6) {
-                self.free = distance - clearance;
+                self.free = distance - guard.clearance;
                 return p;
             }
             self.free = 0.0;
