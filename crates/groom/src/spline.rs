@@ -1,7 +1,7 @@
 //! Smooth curves through and near polylines: Hermite pieces and uniform cubic B-splines.
 //!
-//! After Chang, Jin, Yu, "A practical model for hair mutual interactions" (course notes 2003, "sparse guide hairs"), §2.2:
-//! guide hairs are smoothed by Hermite pieces, turned into B-splines and edited by their control points.
+//! After Chang, Jin, Yu (course notes 2003, "sparse guide hairs"), §2.2: guide hairs are smoothed by Hermite pieces,
+//! turned into B-splines and edited by their control points.
 
 use nalgebra::{DMatrix, DVector};
 use pelage_geom::Vec3;
@@ -110,14 +110,20 @@ impl BSpline {
         BSpline::fit(&curve, &arc_parameters(&curve), m)
     }
 
-    /// Point at `t`, clamped to [0, 1].
+    /// Point at `t`, clamped to [0, 1]; the first control point, or zero, of less than four.
     pub fn at(&self, t: f64) -> Vec3 {
+        if self.control.len() < 4 {
+            return self.control.first().copied().unwrap_or_default();
+        }
         let (first, w) = weights(t, self.control.len());
         (0..4).fold(Vec3::zeros(), |s, i| s + self.control[first + i] * w[i])
     }
 
-    /// Derivative by `t` there.
+    /// Derivative by `t` there; zero for less than four control points.
     pub fn derivative(&self, t: f64) -> Vec3 {
+        if self.control.len() < 4 {
+            return Vec3::zeros();
+        }
         let (first, u) = place(t, self.control.len());
         let d = |i: usize| self.control[first + i + 1] - self.control[first + i];
         let w = [0.5 * (1.0 - u) * (1.0 - u), 0.5 + u * (1.0 - u), 0.5 * u * u];
@@ -199,6 +205,8 @@ mod tests {
         let of = |n: usize, m: usize| BSpline::fit(&random(n), &vec![0.5; n], m).err().unwrap_or_default();
         assert!(of(3, 4).contains("not 4") && of(9, 3).contains("not 3") && of(9, 7).contains("do not determine"));
         assert!(BSpline::fit(&points, &[2.0; 12], 5).is_err());
+        let short = BSpline { control: vec![Vec3::x(); 3] };
+        assert_eq!((short.at(0.5), short.derivative(0.5)), (Vec3::x(), Vec3::zeros()));
     }
 
     #[test]

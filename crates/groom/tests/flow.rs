@@ -71,15 +71,16 @@ fn a_symmetric_flow_stays_so() {
     let flow = body.flow(&elements, &strength);
     for k in 0..50 {
         let p = on_sphere(k) * 1.3;
-        // A quarter turn about the stream maps the sphere's vertices onto themselves, but not the diagonals of its quads.
+        // A quarter turn about the stream maps the sphere's vertices onto themselves, but not the diagonals of its
+        // quads.
         let q = Vec3::new(p.z, p.y, -p.x);
         let (v, w) = (flow.velocity(p), flow.velocity(q));
         assert!((w - Vec3::new(v.z, v.y, -v.x)).norm() < 0.02, "{k}");
     }
 }
 
-/// Part of the streamlines that come below the panels of a sphere, from starts on the side that the stream hits, `up` edges of a
-/// panel above them, where flow of speed `wall` comes out of that side.
+/// Part of the streamlines that come below the panels of a sphere, from starts on the side that the stream hits, `up`
+/// edges of a panel above them, where flow of speed `wall` comes out of that side.
 fn leaks(n: usize, wall: f64, up: f64, guarded: bool) -> f64 {
     let mesh = cube_sphere(n, 1.0);
     let (body, bvh) = (body(&mesh), bvh(&mesh));

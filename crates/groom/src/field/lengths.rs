@@ -56,19 +56,19 @@ impl Shear {
         shortest_to_plane(scalp, root, &self.plane(root))
     }
 
-    /// Length of a hair, root first, that is cut where it first meets the plane of its root as it hangs; none if it does not reach
-    /// it.
+    /// Length of a hair, root first, that is cut where it first meets the plane of its root as it hangs; none if it
+    /// does not reach it.
     pub fn length_along(&self, line: &[Vec3]) -> Option<f64> {
         let plane = self.plane(*line.first()?);
         crate::flow::trim::length_to_plane(line, plane.point, plane.normal)
     }
 }
 
-/// Length of the shortest way from a point to a plane that does not run through a sphere. Points within the sphere count as
-/// the nearest on it.
+/// Length of the shortest way from a point to a plane that does not run through a sphere. Points within the sphere
+/// count as the nearest on it.
 ///
-/// The way lies in the plane of the point, the centre and the normal, and goes straight to the sphere's tangent, around the
-/// sphere, and along the normal. With z along the normal toward the plane, from the centre, it leaves the sphere at
+/// The way lies in the plane of the point, the centre and the normal, and goes straight to the sphere's tangent, around
+/// the sphere, and along the normal. With z along the normal toward the plane, from the centre, it leaves the sphere at
 /// z = 0, or at the plane if that comes before.
 pub fn shortest_to_plane(sphere: &Sphere, from: Vec3, plane: &Plane) -> f64 {
     let radius = sphere.radius.max(0.0);
@@ -104,9 +104,9 @@ pub fn shortest_to_plane(sphere: &Sphere, from: Vec3, plane: &Plane) -> f64 {
     tangent + radius * (touch - leave) + height.max(0.0)
 }
 
-/// Length at a root between lengths at key places of the scalp: weighted by the inverse square of the angle between their
-/// directions from the centre (Shepard 1968, "A two-dimensional interpolation function for irregularly-spaced data"). At a key
-/// place it is the key's; everywhere it is between the least and the greatest. 0 without keys.
+/// Length at a root between lengths at key places of the scalp: weighted by the inverse square of the angle between
+/// their directions from the centre (Shepard 1968, "A two-dimensional interpolation function for irregularly-spaced
+/// data"). At a key place it is the key's; everywhere it is between the least and the greatest. 0 without keys.
 pub fn between_keys(centre: Vec3, keys: &[(Vec3, f64)], root: Vec3) -> f64 {
     let direction = root - centre;
     let (mut sum, mut weights) = (0.0, 0.0);
@@ -136,8 +136,9 @@ mod tests {
         a * c + d * s
     }
 
-    /// Least length over ways of a great circle and a straight piece from it, on a unit sphere; `root` is on it. Ways leave the
-    /// root in any direction and the sphere anywhere, along the normal if nothing is in the way or else along their circle.
+    /// Least length over ways of a great circle and a straight piece from it, on a unit sphere; `root` is on it. Ways
+    /// leave the root in any direction and the sphere anywhere, along the normal if nothing is in the way or else along
+    /// their circle.
     fn brute(root: Vec3, height: f64, up: Vec3) -> f64 {
         let (up, height) = if height < root.dot(&up) { (-up, -height) } else { (up, height) };
         let e1 =

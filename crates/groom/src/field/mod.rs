@@ -1,8 +1,8 @@
 //! Guide hairs that follow a sum of simple vector fields.
 //!
-//! After Chang, Jin, Yu (course notes 2003, "sparse guide hairs"), §2.1 and 2.2: each primitive is a direction and a strength
-//! in coordinates of its own, acts on the hair of its regions of the scalp, and makes one large feature of the style; hair
-//! follows their sum, segment by segment, up to its length ([`lengths`]).
+//! After Chang, Jin, Yu (course notes 2003, "sparse guide hairs"), §2.1 and 2.2: each primitive is a direction and a
+//! strength in coordinates of its own, acts on the hair of its regions of the scalp, and makes one large feature of the
+//! style; hair follows their sum, segment by segment, up to its length ([`lengths`]).
 
 pub mod lengths;
 mod orientation;
@@ -23,14 +23,14 @@ pub struct Primitive {
     pub rotation: UnitQuaternion<f64>,
     /// Its direction at a point.
     pub orientation: Orientation,
-    /// Its strength at its reference, negative to turn it round. Strengths of primitives weigh against each other; the speed of
-    /// the sum does not matter.
+    /// Its strength at its reference, negative to turn it round. Strengths of primitives weigh against each other; the
+    /// speed of the sum does not matter.
     pub strength: f64,
     /// How the strength falls with distance from the origin, or from the curve of [`Orientation::Along`] and
     /// [`Orientation::Roller`].
     pub falloff: Falloff,
-    /// Lengths of its axes that count as distance 1: (1, 1, 1) for scene units, unequal for an ellipsoid. A thin one divides
-    /// hair (figure 4a). All positive; with a curve only the first counts.
+    /// Lengths of its axes that count as distance 1: (1, 1, 1) for scene units, unequal for an ellipsoid. A thin one
+    /// divides hair (figure 4a). All positive; with a curve only the first counts.
     pub shape: Vec3,
     /// Regions of the scalp that it acts on, by where hairs are rooted; none for everywhere.
     pub domain: Vec<Region>,
@@ -157,8 +157,8 @@ impl Region {
 pub struct GuideField {
     /// The primitives.
     pub primitives: Vec<Primitive>,
-    /// Dividers: hair rooted on one side of their borders sees only the primitives positioned on that side, but for those that
-    /// act `across`.
+    /// Dividers: hair rooted on one side of their borders sees only the primitives positioned on that side, but for
+    /// those that act `across`.
     pub dividers: Vec<Region>,
 }
 

@@ -4,8 +4,8 @@ use crate::flow::segment;
 use pelage_geom::Vec3;
 use pelage_geom::curve::closest_on_polyline;
 
-/// The direction of a primitive in its own coordinates: unit vectors but for a [`Orientation::Wave`], zero where there is
-/// none.
+/// The direction of a primitive in its own coordinates: unit vectors but for a [`Orientation::Wave`], zero where there
+/// is none.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Orientation {
     /// The same everywhere.
@@ -24,8 +24,8 @@ pub enum Orientation {
     },
     /// Away from the plane x = 0 on either side: hair parts there (figure 4a).
     Divide,
-    /// Around a wire as the magnetic field of a current in it (law of Biot and Savart; figure 4b), drawn to the surface of a
-    /// tube about it: hair winds up on a roller.
+    /// Around a wire as the magnetic field of a current in it (law of Biot and Savart; figure 4b), drawn to the surface
+    /// of a tube about it: hair winds up on a roller.
     Roller {
         /// The wire, at least two points: straight or an arc.
         points: Vec<Vec3>,

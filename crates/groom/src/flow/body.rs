@@ -79,9 +79,9 @@ pub struct Body {
 }
 
 impl Body {
-    /// Factors the matrix of a closed mesh (triangles counter-clockwise seen from outside): the paper's flow boundary form
-    /// S(i, j), the normal velocity at the centre of panel i by a unit strength of panel j (equation 9). N panels take
-    /// 8 N^2 bytes and time as N^3: 1,000 panels half a second.
+    /// Factors the matrix of a closed mesh (triangles counter-clockwise seen from outside): the paper's flow boundary
+    /// form S(i, j), the normal velocity at the centre of panel i by a unit strength of panel j (equation 9). N panels
+    /// take 8 N^2 bytes and time as N^3: 1,000 panels half a second.
     pub fn new(position: &[[f64; 3]], triangle: &[[u32; 3]]) -> Result<Self, FlowError> {
         if triangle.is_empty() {
             return Err(FlowError::NoPanels);
@@ -110,8 +110,8 @@ impl Body {
         &self.panel
     }
 
-    /// \[N\] strengths with which the flow of elements and panels leaves panel i at the speed `normal_velocity[i]` along its
-    /// normal, at its centre (equation 8). Negative speeds go in.
+    /// \[N\] strengths with which the flow of elements and panels leaves panel i at the speed `normal_velocity[i]`
+    /// along its normal, at its centre (equation 8). Negative speeds go in.
     pub fn solve(&self, elements: &[Element], normal_velocity: &[f64]) -> Result<Vec<f64>, FlowError> {
         if normal_velocity.len() != self.panel.len() {
             return Err(FlowError::WrongCount { panels: self.panel.len(), given: normal_velocity.len() });

@@ -5,8 +5,9 @@ use pelage_geom::Vec3;
 /// 1 / (4 pi).
 pub(super) const PER_SPHERE: f64 = 1.0 / (4.0 * std::f64::consts::PI);
 
-/// One element of ideal flow (Hadap, Magnenat-Thalmann, "Hair shape as streamlines of fluid flow", §2.1 to 2.3), in scene
-/// units: positions and `core` are lengths, velocities are speeds on any scale (streamlines follow their direction only).
+/// One element of ideal flow (Hadap, Magnenat-Thalmann, "Hair shape as streamlines of fluid flow", §2.1 to 2.3), in
+/// scene units: positions and `core` are lengths, velocities are speeds on any scale (streamlines follow their
+/// direction only).
 ///
 /// Within `core` of its singularity a velocity falls linearly to zero, outside it is exact. A core of 0 is allowed; on
 /// the singularity itself the velocity is then zero.
@@ -26,7 +27,8 @@ pub enum Element {
         /// Radius of the core.
         core: f64,
     },
-    /// Flow around an infinite line, counter-clockwise seen from where `axis` points to, its speed |strength| / (2 pi r).
+    /// Flow around an infinite line, counter-clockwise seen from where `axis` points to, its speed |strength| / (2 pi
+    /// r).
     Vortex {
         /// A point of the line.
         at: Vec3,
@@ -37,8 +39,8 @@ pub enum Element {
         /// Radius of the core.
         core: f64,
     },
-    /// Flow around a polyline by the law of Biot and Savart (equation 4 for each segment). The field of an open filament
-    /// has no sources, but is irrotational only for a closed one (last point equal to the first).
+    /// Flow around a polyline by the law of Biot and Savart (equation 4 for each segment). The field of an open
+    /// filament has no sources, but is irrotational only for a closed one (last point equal to the first).
     Filament {
         /// Points in the direction that the flow goes around counter-clockwise seen from ahead.
         points: Vec<Vec3>,

@@ -4,15 +4,15 @@ use super::{Fast, FlowError};
 use pelage_geom::{NONE, Vec3};
 use rayon::prelude::*;
 
-/// Distance in cells within which panels and elements are summed where they are asked for, and not kept at the nodes. At 0
-/// the jump of the velocity across the body is smeared over a cell; beyond 2 cells the sums take most of the time.
+/// Distance in cells within which panels and elements are summed where they are asked for, and not kept at the nodes.
+/// At 0 the jump of the velocity across the body is smeared over a cell; beyond 2 cells the sums take most of the time.
 const NEAR: f64 = 1.0;
 
 /// Nodes up to which a grid is filled: 3 GB.
 const MOST_NODES: f64 = 1e8;
 
-/// A flow in cubic cells: trilinear between nodes. In cells near panels or elements these are summed exactly, and only the rest
-/// is trilinear; outside the grid everything is summed.
+/// A flow in cubic cells: trilinear between nodes. In cells near panels or elements these are summed exactly, and only
+/// the rest is trilinear; outside the grid everything is summed.
 #[derive(Debug)]
 pub struct Grid<'a> {
     fast: &'a Fast<'a>,
@@ -31,9 +31,10 @@ pub struct Grid<'a> {
 }
 
 impl<'a> Grid<'a> {
-    /// Fills a grid over the box from `low` to `high` with cells of edge `cell`, all in scene units. Relative errors measured
-    /// around a sphere of radius R of 768 panels with a stream, a source and a vortex: with cells of R / 8 half of the velocities
-    /// are within 3e-4 and all within 13 %; with R / 16 within 1e-4 and 5 %. The largest are where the flow nearly rests.
+    /// Fills a grid over the box from `low` to `high` with cells of edge `cell`, all in scene units. Relative errors
+    /// measured around a sphere of radius R of 768 panels with a stream, a source and a vortex: with cells of R / 8
+    /// half of the velocities are within 3e-4 and all within 13 %; with R / 16 within 1e-4 and 5 %. The largest are
+    /// where the flow nearly rests.
     pub fn fill(fast: &'a Fast<'a>, low: Vec3, high: Vec3, cell: f64) -> Result<Self, FlowError> {
         let count = ((high - low) / cell).map(|c| c.ceil().max(1.0));
         let nodes = count.iter().map(|c| c + 1.0).product::<f64>();

@@ -2,19 +2,20 @@
 //!
 //! After Hadap, Magnenat-Thalmann, "Hair shape as streamlines of fluid flow" (course notes 2003): a stream, sources and
 //! vortices that a person places ([`Element`]); a body whose panels are sources of such strengths that the flow through
-//! them is what a map says ([`Body`], the paper's equations 6 to 9); hair that follows the sum ([`trace`]). The paper puts a
-//! point source under each panel; here the panel itself is the source, so that there is no offset to choose and less flow
-//! leaks between the panels.
+//! them is what a map says ([`Body`], the paper's equations 6 to 9); hair that follows the sum ([`trace`]). The paper
+//! puts a point source under each panel; here the panel itself is the source, so that there is no offset to choose and
+//! less flow leaks between the panels.
 //!
-//! The flow through a panel is what is asked at its centre only. Near the edges of a wall it goes in and out, and inside the body
-//! it does not rest: a streamline that gets in crosses the body. Measured on spheres of 192 and 768 panels in a stream of speed 1:
-//! where the wall lets 0.3 through, no streamline comes in that starts a tenth of a panel's edge above it; where it lets nothing
-//! through, about 2 % of those do that start 0.3 edges above it, and most that start right on it. So whatever the panels, let a
-//! [`trace::Guard`] hold points outside.
+//! The flow through a panel is what is asked at its centre only. Near the edges of a wall it goes in and out, and
+//! inside the body it does not rest: a streamline that gets in crosses the body. Measured on spheres of 192 and 768
+//! panels in a stream of speed 1: where the wall lets 0.3 through, no streamline comes in that starts a tenth of a
+//! panel's edge above it; where it lets nothing through, about 2 % of those do that start 0.3 edges above it, and most
+//! that start right on it. So whatever the panels, let a [`trace::Guard`] hold points outside.
 //!
-//! A flow is cheap to edit: the matrix of a body is factored once ([`Body::new`]), and after a change of elements or of the
-//! map only [`Body::solve`] is needed, as it is for every frame of moving elements. To trace many hairs, sum the panels
-//! in a tree and keep the sum in a grid: [`Fast`], [`Grid`]. [`Flow::velocity`] is the plain sum to compare with.
+//! A flow is cheap to edit: the matrix of a body is factored once ([`Body::new`]), and after a change of elements or of
+//! the map only [`Body::solve`] is needed, as it is for every frame of moving elements. To trace many hairs, sum the
+//! panels in a tree and keep the sum in a grid: [`Fast`], [`Grid`]. [`Flow::velocity`] is the plain sum to compare
+//! with.
 
 mod body;
 mod element;
@@ -47,8 +48,8 @@ pub struct Flow<'a> {
 }
 
 impl Flow<'_> {
-    /// Velocity at a point, summed over all elements and panels. At a panel's centre the sides are taken as they come in
-    /// rounding: see [`Flow::velocity_at_panel`].
+    /// Velocity at a point, summed over all elements and panels. At a panel's centre the sides are taken as they come
+    /// in rounding: see [`Flow::velocity_at_panel`].
     pub fn velocity(&self, at: Vec3) -> Vec3 {
         let panels = self.panels.iter().zip(self.strength);
         panels.fold(self.by_elements(at), |v, (p, s)| v + p.velocity(at) * *s)

@@ -34,8 +34,8 @@ impl Panel {
     }
 
     /// Velocity at a point by a unit strength: exact, after Hess and Smith (1967, "Calculation of potential flow about
-    /// arbitrary bodies"). Along the normal it is the solid angle over 4 pi, which jumps by 1 across the panel; along the
-    /// panel each edge gives its outward normal times the integral of 1 / distance over it.
+    /// arbitrary bodies"). Along the normal it is the solid angle over 4 pi, which jumps by 1 across the panel; along
+    /// the panel each edge gives its outward normal times the integral of 1 / distance over it.
     pub fn velocity(&self, at: Vec3) -> Vec3 {
         let ray = self.corner.map(|c| c - at);
         let distance = ray.map(|r| r.norm());
@@ -71,8 +71,8 @@ impl Panel {
     }
 }
 
-/// Solid angle of a triangle, positive seen from its front, by rays to its corners and their lengths (Van Oosterom, Strackee
-/// 1983, "The solid angle of a plane triangle").
+/// Solid angle of a triangle, positive seen from its front, by rays to its corners and their lengths (Van Oosterom,
+/// Strackee 1983, "The solid angle of a plane triangle").
 fn solid_angle(r: &[Vec3; 3], d: &[f64; 3]) -> f64 {
     let volume = r[0].dot(&r[1].cross(&r[2]));
     let across = d[0] * d[1] * d[2] + r[0].dot(&r[1]) * d[2] + r[0].dot(&r[2]) * d[1] + r[1].dot(&r[2]) * d[0];

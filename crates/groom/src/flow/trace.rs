@@ -1,14 +1,14 @@
 //! Polylines that follow a field of directions: streamlines, guide hairs.
 //!
-//! Lines are followed by arc length with Runge-Kutta steps of fourth order; between the ends of a step runs a cubic with the
-//! field's directions at both. Points are laid off on it with a pair of compasses: all chords of a line are equal (to
-//! rounding) and add up to the length that was asked for, as hair that does not stretch needs it.
+//! Lines are followed by arc length with Runge-Kutta steps of fourth order; between the ends of a step runs a cubic
+//! with the field's directions at both. Points are laid off on it with a pair of compasses: all chords of a line are
+//! equal (to rounding) and add up to the length that was asked for, as hair that does not stretch needs it.
 
 use pelage_geom::{Bvh, Vec3};
 use rayon::prelude::*;
 
-/// Chords that a line may run without getting one chord away from its last point before it counts as caught, as around a
-/// sink. A half circle about the last point takes 3.2; higher only takes longer.
+/// Chords that a line may run without getting one chord away from its last point before it counts as caught, as around
+/// a sink. A half circle about the last point takes 3.2; higher only takes longer.
 const CAUGHT: f64 = 5.0;
 
 /// Least length of the mean direction of a step: below, the directions contradict each other (a turn by more than 120
@@ -23,8 +23,8 @@ const RISE: f64 = 0.5;
 pub struct Trace {
     /// P, the points of every line; at least 2.
     pub points: usize,
-    /// Arc length of a step, scene units. Steps are at least 1/16 of and at most 16 chords long, and one chord if this is 0.
-    /// At 1/5 of the field's radius of curvature a line goes off by 1e-5 of its length.
+    /// Arc length of a step, scene units. Steps are at least 1/16 of and at most 16 chords long, and one chord if this
+    /// is 0. At 1/5 of the field's radius of curvature a line goes off by 1e-5 of its length.
     pub step: f64,
     /// Against the field.
     pub reverse: bool,
@@ -43,7 +43,8 @@ pub struct Start {
     pub length: f64,
 }
 
-/// A closed surface that points of lines stay out of.
+/// A closed surface that points of lines stay out of: the skin, or the panels where these lie above it (the flow below
+/// them is that within the body).
 #[derive(Clone, Copy, Debug)]
 pub struct Guard<'a> {
     /// The surface.
@@ -75,8 +76,8 @@ impl Lines {
     }
 }
 
-/// Follows the velocities `field(line, point)` from every start. Points that would be within the guard are put back out, with
-/// the same distance to the point before.
+/// Follows the velocities `field(line, point)` from every start. Points that would be within the guard are put back
+/// out, with the same distance to the point before.
 pub fn trace(
     field: impl Fn(usize, Vec3) -> Vec3 + Sync,
     starts: &[Start],
@@ -180,8 +181,8 @@ impl Arc {
             + (self.ends[1] * (1.0 + 2.0 * u) - self.tangents[1] * u) * (t * t)
     }
 
-    /// First place beyond `t` at a distance from a point that is nearer at `t` and not at the end: regula falsi, Illinois
-    /// variant. Moved along the line to the point onto that distance.
+    /// First place beyond `t` at a distance from a point that is nearer at `t` and not at the end: regula falsi,
+    /// Illinois variant. Moved along the line to the point onto that distance.
     fn at_distance(&self, from: Vec3, distance: f64, t: f64) -> (Vec3, f64) {
         let off = |t: f64| (self.at(t) - from).norm() - distance;
         let (mut low, mut high) = ((t, off(t)), (1.0, off(1.0)));

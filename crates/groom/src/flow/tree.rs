@@ -1,5 +1,5 @@
-//! The velocity by many panels in a time that hardly grows with their number (Barnes, Hut 1986, "A hierarchical O(N log N)
-//! force-calculation algorithm").
+//! The velocity by many panels in a time that hardly grows with their number (Barnes, Hut 1986, "A hierarchical O(N log
+//! N) force-calculation algorithm").
 
 use super::element::PER_SPHERE;
 use super::{Flow, Panel};
@@ -20,9 +20,9 @@ struct Node {
     magnitude: f64,
     dipole: Vec3,
     quadrupole: Matrix3<f64>,
-    /// A single panel, or the first of the two halves; the other half follows it in the list after `skip` nodes.
+    /// The panel of a group of one.
     panel: Option<u32>,
-    /// Nodes of this group, itself included.
+    /// Nodes of this group, itself included: the first half follows it, then the other.
     size: u32,
 }
 
@@ -57,8 +57,9 @@ impl<'a> Fast<'a> {
         self.visit(at, |_, _| ())
     }
 
-    /// An upper bound of the error of [`Fast::velocity`]. A point off the centre by d has, beyond the quadrupole, terms of order l of
-    /// at most (l + 1) d^l / r^(l+2) over 4 pi, which sum to t^3 (4 - 3 t) / (1 - t)^2 / r^2 with t = d / r.
+    /// An upper bound of the error of [`Fast::velocity`]. A point off the centre by d has, beyond the quadrupole, terms
+    /// of order l of at most (l + 1) d^l / r^(l+2) over 4 pi, which sum to t^3 (4 - 3 t) / (1 - t)^2 / r^2 with t = d /
+    /// r.
     pub fn error_bound(&self, at: Vec3) -> f64 {
         let mut bound = 0.0;
         self.visit(at, |node, square| {

@@ -2,8 +2,8 @@
 
 use pelage_geom::{Bvh, Vec3, curve::resample};
 
-/// Length of a polyline from its root to where it first runs through a surface, from either side; none if it never does. The
-/// trimming tool of Hadap, Magnenat-Thalmann §3.
+/// Length of a polyline from its root to where it first runs through a surface, from either side; none if it never
+/// does. The trimming tool of Hadap, Magnenat-Thalmann §3.
 pub fn length_to(line: &[Vec3], surface: &Bvh) -> Option<f64> {
     let mut before = 0.0;
     for w in line.windows(2) {
@@ -16,8 +16,8 @@ pub fn length_to(line: &[Vec3], surface: &Bvh) -> Option<f64> {
     None
 }
 
-/// Length of a polyline from its root to where it first runs through the plane through `point` across `normal`, from either
-/// side; none if it never does.
+/// Length of a polyline from its root to where it first runs through the plane through `point` across `normal`, from
+/// either side; none if it never does.
 pub fn length_to_plane(line: &[Vec3], point: Vec3, normal: Vec3) -> Option<f64> {
     let mut before = 0.0;
     for w in line.windows(2) {
