@@ -9,6 +9,8 @@ mod chart_cut;
 pub mod comb;
 pub mod control;
 pub mod depenetrate;
+pub mod field;
+pub mod flow;
 pub mod instance;
 pub mod interpolate;
 pub mod keep;
@@ -17,6 +19,7 @@ pub mod parting;
 pub mod place;
 mod point_grid;
 pub mod push_up;
+pub mod spline;
 #[cfg(test)]
 mod test_skin;
 pub mod triangulate;
