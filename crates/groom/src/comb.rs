@@ -1,7 +1,7 @@
 //! Combing: a list of operations that turn and scale the segments of control hairs on the rest skin.
 //!
 //! After "Course notes 2003, A production pipeline for hair", §3.2: combing direction curves, degree of bending and
-//! curvature, region of influence with a falloff. An operation never shortens a segment except [`CombKind::Length`]:
+//! curvature, region of influence with a falloff. An operation never shortens a segment except [`CombKind::Length`] and [`CombKind::Cut`]:
 //! directions change, the hair is built up again from its root.
 //!
 //! With `a` the amount of an operation at a hair (its weight, region map, falloff and bend multiplied), segment k turns by
@@ -10,6 +10,9 @@
 //! leaves the root as it is and bends the tip.
 
 use crate::control::{ControlHairs, Skin, to_local, to_world, vec3};
+use crate::field::lengths::{Shear, Sphere};
+use crate::flow::trace::{Lines, Start};
+use crate::flow::trim::cut;
 use pelage_geom::curve::closest_on_polyline;
 use pelage_geom::{Frame, TiledMap, Vec3};
 use rayon::prelude::*;
@@ -22,6 +25,9 @@ const FLAT_ELEVATION: f64 = 2.0 * std::f64::consts::PI / 180.0;
 /// must not count; a painted unit vector blurred over a fan of 90 degrees still has a length of 0.6.
 const UNPAINTED: f64 = 0.02;
 
+/// Part of its length by which a hair is shorter that counts as cut: more than what 32 bits round off.
+const CUT: f64 = 1e-5;
+
 /// One step of combing.
 #[derive(Clone, Debug)]
 pub struct CombOp<'a> {
@@ -33,6 +39,17 @@ pub struct CombOp<'a> {
     pub region: Option<&'a TiledMap>,
     /// Only the hairs on one side of a parting: (index of the parting, +1 left or -1 right).
     pub side: Option<(u32, i8)>,
+}
+
+/// Lines from the roots of all hairs, each as long as its hair and of as many points, scene space: a field that is traced, a
+/// cylinder that roots lie in.
+#[derive(Clone, Copy)]
+pub struct Guides<'a>(pub &'a (dyn Fn(&[Start]) -> Lines + Sync));
+
+impl std::fmt::Debug for Guides<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Guides")
+    }
 }
 
 /// The kinds of combing.
@@ -62,6 +79,15 @@ pub enum CombKind<'a> {
         /// Where along the hair, 0 to 1.
         curvature: f64,
     },
+    /// Toward a line from the hair's root, segment by segment: with an amount of 1 the hair takes its shape.
+    Follow {
+        /// The lines.
+        guides: Guides<'a>,
+        /// How far toward the line, 0 to 1.
+        bend: f64,
+        /// Where along the hair, 0 to 1.
+        curvature: f64,
+    },
     /// Turns segments in the plane of the normal and the hair's lean, away from the normal. The lean is the part of
     /// root to tip in the tangent plane, for an upright hair dU.
     Bend {
@@ -79,6 +105,14 @@ pub enum CombKind<'a> {
         amount: f64,
         /// Map multiplied onto the amount.
         map: Option<&'a TiledMap>,
+    },
+    /// Cuts hairs at a plane each ("sparse guide hairs" in the same course notes, §2.1); it never lengthens one. A weight of w
+    /// takes off w of what the cut would.
+    Cut {
+        /// The planes.
+        shear: &'a Shear,
+        /// Hair is as long as the way around this sphere to its plane; without, it is cut where it meets the plane.
+        scalp: Option<Sphere>,
     },
     /// Multiplies lengths by `1 + weight (value * map - 1)`, not less than 1/1000.
     Length {
@@ -112,7 +146,13 @@ pub struct CombCounts {
 pub fn comb(skin: &Skin, partings: &[Vec<Vec3>], ops: &[CombOp], hairs: &mut ControlHairs) -> Vec<CombCounts> {
     let mut counts = vec![CombCounts::default(); ops.len()];
     let frames: Vec<Frame> = hairs.root.par_iter().map(|p| skin.frame(p)).collect();
+    let lengths = |hairs: &ControlHairs| (0..hairs.len()).map(|h| hairs.length(h)).collect::<Vec<f64>>();
     for (op, count) in ops.iter().zip(&mut counts) {
+        let before = if matches!(op.kind, CombKind::Cut { .. }) { lengths(hairs) } else { Vec::new() };
+        let lines = match &op.kind {
+            CombKind::Follow { guides, .. } => (guides.0)(&starts(&frames, hairs)),
+            _ => Lines::default(),
+        };
         let (root, side, parting, points) = (&hairs.root, &hairs.side, &hairs.parting, hairs.points);
         let outcome = |(h, local): (usize, &mut [[f32; 3]])| {
             let frame = &frames[h];
@@ -126,13 +166,39 @@ pub fn comb(skin: &Skin, partings: &[Vec<Vec3>], ops: &[CombOp], hairs: &mut Con
             if weight == 0.0 {
                 return CombCounts::default();
             }
-            apply(&op.kind, weight, uv, frame, local)
+            let line = if lines.at.is_empty() { &[] } else { lines.line(h) };
+            apply(&op.kind, weight, uv, frame, line, local)
         };
         *count = hairs.local.par_chunks_mut(points).enumerate().map(outcome).reduce(CombCounts::default, |a, b| {
             CombCounts { combed: a.combed + b.combed, unpainted: a.unpainted + b.unpainted }
         });
+        for (h, before) in before.into_iter().enumerate() {
+            let now = hairs.length(h);
+            if now < before * (1.0 - CUT) {
+                hairs.cut[h] = now as f32;
+            }
+        }
     }
     counts
+}
+
+/// Where lines of hairs begin, which way without a better one (the normal), and their lengths.
+fn starts(frames: &[Frame], hairs: &ControlHairs) -> Vec<Start> {
+    let start = |(h, f): (usize, &Frame)| Start { at: f.origin, direction: f.n, length: hairs.length(h) };
+    frames.par_iter().enumerate().map(start).collect()
+}
+
+/// Turns segments toward those of a line of as many points, scene space.
+fn follow(line: &[Vec3], a: f64, curvature: f64, frame: &Frame, local: &mut [[f32; 3]]) -> CombCounts {
+    if a == 0.0 {
+        return CombCounts::default();
+    }
+    let mut ahead = line.windows(2).map(|w| to_local(frame, w[1] - w[0]).try_normalize(0.0));
+    rebuild(local, |d, s| {
+        let target = ahead.next().flatten().unwrap_or(d);
+        slerp(d, target, (a * (1.0 - curvature + curvature * s)).clamp(0.0, 1.0))
+    });
+    CombCounts { combed: 1, unpainted: 0 }
 }
 
 /// Part of an operation for one side that a hair on `side` gets; a hair on the line itself gets half.
@@ -171,11 +237,19 @@ fn nearest(line: &[Vec3], at: Vec3) -> Option<(Vec3, Vec3)> {
     Some((p, tangent.try_normalize(1e-6).unwrap_or(here)))
 }
 
-/// One operation on one hair (points relative to the root, in the root frame).
-fn apply(kind: &CombKind, weight: f64, uv: [f32; 2], frame: &Frame, local: &mut [[f32; 3]]) -> CombCounts {
+/// One operation on one hair (points relative to the root, in the root frame); `line` is what it follows, if it does.
+fn apply(
+    kind: &CombKind,
+    weight: f64,
+    uv: [f32; 2],
+    frame: &Frame,
+    line: &[Vec3],
+    local: &mut [[f32; 3]],
+) -> CombCounts {
     let value = |map: &Option<&TiledMap>| map.map_or(1.0, |m| f64::from(m.value(uv)));
     let combed = CombCounts { combed: 1, unpainted: 0 };
     match kind {
+        CombKind::Follow { bend, curvature, .. } => follow(line, weight * bend, *curvature, frame, local),
         CombKind::DirectionCurve { points, radius, falloff, bend, curvature } => {
             let Some((near, tangent)) = nearest(points, frame.origin) else { return CombCounts::default() };
             let a = weight * bend * influence((near - frame.origin).norm(), *radius, *falloff);
@@ -210,6 +284,22 @@ fn apply(kind: &CombKind, weight: f64, uv: [f32; 2], frame: &Frame, local: &mut 
                 let azimuth = Vec3::new(0.0, d.y, d.z).try_normalize(1e-6).unwrap_or(lean);
                 Vec3::x() * libm::sin(e) + azimuth * libm::cos(e)
             });
+            combed
+        }
+        CombKind::Cut { shear, scalp } => {
+            let line = world_points(frame, local);
+            let length: f64 = line.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
+            let asked = match scalp {
+                Some(scalp) => Some(shear.length(scalp, frame.origin)),
+                None => shear.length_along(&line),
+            };
+            let asked = asked.filter(|l| *l < length).map(|l| length + weight.min(1.0) * (l - length));
+            let Some(asked) = asked else { return CombCounts::default() };
+            // A hair keeps a little of its length: its direction is needed.
+            for (p, out) in cut(&line, asked.max(1e-3 * length), local.len()).iter().zip(local).skip(1) {
+                let p = to_local(frame, p - frame.origin);
+                *out = [p.x as f32, p.y as f32, p.z as f32];
+            }
             combed
         }
         CombKind::Length { value: factor, map } => {
@@ -256,15 +346,17 @@ fn lean(local: &[[f32; 3]]) -> Vec3 {
 }
 
 /// Gives each segment the direction `turn(direction, s)` at its old length, from the root up.
-fn rebuild(local: &mut [[f32; 3]], turn: impl Fn(Vec3, f64) -> Vec3) {
+fn rebuild(local: &mut [[f32; 3]], mut turn: impl FnMut(Vec3, f64) -> Vec3) {
     let segment: Vec<Vec3> = local.windows(2).map(|w| vec3(w[1]) - vec3(w[0])).collect();
     let last: f64 = segment[..segment.len() - 1].iter().map(|v| v.norm()).sum();
     let (mut at, mut before) = (vec3(local[0]), 0.0);
     for (v, out) in segment.iter().zip(&mut local[1..]) {
         let length = v.norm();
         let s = if last > 0.0 { f64::min(before / last, 1.0) } else { 1.0 };
+        // Every segment turns, one without length for nothing: what is turned toward goes along.
+        let d = turn(v.try_normalize(0.0).unwrap_or_else(Vec3::x), s);
         if length > 0.0 {
-            at += turn(v / length, s).normalize() * length;
+            at += d.normalize() * length;
         }
         before += length;
         *out = [at.x as f32, at.y as f32, at.z as f32];
@@ -321,6 +413,73 @@ mod tests {
 
     fn op(kind: CombKind<'_>) -> CombOp<'_> {
         CombOp { kind, weight: 1.0, region: None, side: None }
+    }
+
+    #[test]
+    fn hair_that_follows_a_line_takes_its_shape_and_keeps_its_length() {
+        let (s, before) = groomed();
+        // Quarter circles in a tilted plane, each of its hair's length.
+        let arc = |starts: &[Start]| {
+            let points = before.points;
+            let at = starts.iter().flat_map(|start| {
+                let radius = start.length / std::f64::consts::FRAC_PI_2;
+                (0..points).map(move |k| {
+                    let a = std::f64::consts::FRAC_PI_2 * k as f64 / (points - 1) as f64;
+                    start.at + (Vec3::y() * libm::sin(a) + Vec3::new(0.6, 0.0, 0.8) * (1.0 - libm::cos(a))) * radius
+                })
+            });
+            Lines { points, at: at.collect(), straight_from: vec![points as u32; starts.len()] }
+        };
+        let follow = |bend| CombKind::Follow { guides: Guides(&arc), bend, curvature: 0.0 };
+        let mut whole = before.clone();
+        let counts = comb(&s.skin(), &[], &[op(follow(1.0))], &mut whole);
+        assert_eq!(counts[0].combed, before.len());
+        let skin = s.skin();
+        for h in 0..before.len() {
+            let frame = skin.frame(&before.root[h]);
+            let line = world_points(&frame, whole.hair(h));
+            let start = Start { at: frame.origin, direction: frame.n, length: before.length(h) };
+            let guide = arc(&[start]).at;
+            for (w, g) in line.windows(2).zip(guide.windows(2)) {
+                let (w, g) = (w[1] - w[0], g[1] - g[0]);
+                assert!(w.normalize().dot(&g.normalize()) > 1.0 - 1e-9, "{w} {g}");
+            }
+            assert!((whole.length(h) - before.length(h)).abs() < 1e-5);
+        }
+        let mut none = before.clone();
+        comb(&s.skin(), &[], &[op(follow(0.0))], &mut none);
+        assert_eq!(none, before);
+        let mut half = before.clone();
+        comb(&s.skin(), &[], &[op(follow(0.5))], &mut half);
+        assert!(half != before && half != whole);
+    }
+
+    #[test]
+    fn cut_hair_ends_at_its_plane_and_is_never_longer() {
+        use crate::field::lengths::Plane;
+        let (s, before) = groomed();
+        let skin = s.skin();
+        let frame = |h: usize| skin.frame(&before.root[h]);
+        let tips: Vec<Vec3> =
+            (0..before.len()).map(|h| *world_points(&frame(h), before.hair(h)).last().unwrap()).collect();
+        // Through the middle of all hair, across the normal of the first.
+        let (point, normal) = (tips[0] - frame(0).n * 1.2, frame(0).n);
+        let shear = Shear::Cut { plane: Plane { point, normal } };
+        let mut hairs = before.clone();
+        let counts = comb(&skin, &[], &[op(CombKind::Cut { shear: &shear, scalp: None })], &mut hairs);
+        assert!(counts[0].combed > 0);
+        for h in 0..before.len() {
+            let (old, new) = (before.length(h), hairs.length(h));
+            let tip = *world_points(&frame(h), hairs.hair(h)).last().unwrap();
+            let crosses = (frame(h).origin - point).dot(&normal) <= 0.0 && (tips[h] - point).dot(&normal) > 0.0;
+            if crosses {
+                assert!((tip - point).dot(&normal).abs() < 1e-5 && new < old, "{h}");
+                assert_eq!(hairs.cut[h], new as f32);
+            } else if (frame(h).origin - point).dot(&normal) <= 0.0 {
+                assert_eq!((hairs.hair(h), hairs.cut[h]), (before.hair(h), f32::INFINITY));
+            }
+            assert!(new <= old * (1.0 + 1e-6));
+        }
     }
 
     fn curve(radius: f64, bend: f64, curvature: f64) -> CombKind<'static> {

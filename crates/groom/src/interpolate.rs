@@ -303,6 +303,17 @@ pub fn interpolate_reference(hairs: &Blend, controls: &ControlPose) -> (Vec<Vec3
     (out, counts)
 }
 
+/// Lengths of hairs among control hairs of which some were cut: the blend of what each would leave of it. `hair` and `weight`
+/// as in [`Blend`], `cut` as in [`crate::control::ControlHairs`].
+pub fn cut_lengths(hair: &[[u32; 3]], weight: &[[f32; 3]], cut: &[f32], length: &mut [f32]) {
+    for ((length, hair), weight) in length.iter_mut().zip(hair).zip(weight) {
+        let left = hair.map(|c| cut[c as usize]);
+        if left.iter().any(|l| *l < *length) {
+            *length = (0..3).map(|k| weight[k] * left[k].min(*length)).sum();
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -372,6 +383,16 @@ mod tests {
                 assert!((vec3(*f) - p).norm() <= 1e-6 * scale, "points {points}, hair {}: {f:?} {p:?}", i / points);
             }
         }
+    }
+
+    #[test]
+    fn hair_among_cut_hairs_is_as_long_as_they_leave_it() {
+        let cut = [5.0, f32::INFINITY, 3.0];
+        let hair = [[0, 1, 2], [1, 1, 1], [0, 1, 2], [2, 1, 0]];
+        let weight = [[0.5, 0.25, 0.25], [0.5, 0.25, 0.25], [0.5, 0.25, 0.25], [1.0, 0.0, 0.0]];
+        let mut length = [8.0, 8.0, 2.0, 8.0];
+        cut_lengths(&hair, &weight, &cut, &mut length);
+        assert_eq!(length, [0.5 * 5.0 + 0.25 * 8.0 + 0.25 * 3.0, 8.0, 2.0, 3.0]);
     }
 
     #[test]

@@ -109,6 +109,8 @@ pub struct Project {
     pub curves: Option<InputFile>,
     /// Curves that control hairs are drawn as, if they are.
     pub drawn: Option<InputFile>,
+    /// Meshes whose triangles are the panels of flows, by comb operation.
+    pub panels: BTreeMap<usize, InputFile>,
     /// The skin at every frame of the shot.
     pub frames: BTreeMap<i32, SkinAt>,
     /// The skin at frames of the pre-roll that a sequence has files for.
@@ -174,6 +176,12 @@ impl Project {
         let bodies = if simulated || !shot.value.light.is_empty() { find.bodies(&shot)? } else { Vec::new() };
         let drawn = groom.value.control.placement.curves.as_ref();
         let drawn = drawn.map(|p| find.file(&groom, "control.placement.curves", p)).transpose()?;
+        let mut panels = BTreeMap::new();
+        for (i, c) in groom.value.comb.iter().enumerate() {
+            if let Some(path) = c.panels.as_ref().and_then(|p| p.file.as_ref()) {
+                panels.insert(i, find.file(&groom, &format!("comb[{i}].panels.file"), path)?);
+            }
+        }
         let emitters = groom.value.emitter.iter().enumerate();
         let file = |(k, e): (usize, &Emitter)| {
             e.file.as_ref().map(|f| find.file(&groom, &format!("emitter[{k}].file"), f)).transpose()
@@ -199,6 +207,7 @@ impl Project {
             curves,
             bodies,
             drawn,
+            panels,
             frames,
             before,
             motion,
@@ -236,7 +245,7 @@ impl Project {
         let motions = self.bodies.iter().map(|b| &b.motion).chain([&self.motion]).flatten().map(|m| &m.file);
         let single = [&self.rest, &self.curves, &self.drawn].into_iter().flatten();
         let maps = self.maps.values().chain(&self.mask).flatten().map(|(_, file)| file);
-        let single = single.chain(self.particles.iter().flatten());
+        let single = single.chain(self.particles.iter().flatten()).chain(self.panels.values());
         single.chain(skins).chain(self.bodies.iter().map(|b| &b.file)).chain(motions).chain(maps).collect()
     }
 
@@ -406,6 +415,8 @@ fn named_maps(groom: &GroomFile) -> Vec<(String, PathBuf)> {
     for (i, c) in groom.comb.iter().enumerate() {
         add(format!("comb[{i}].region.map"), c.region.as_ref().map(|m| &m.map));
         add(format!("comb[{i}].map.map"), c.map.as_ref().map(|m| &m.map));
+        let through = c.panels.as_ref().and_then(|p| p.through.map.as_ref());
+        add(format!("comb[{i}].panels.through.map"), through);
     }
     for (i, l) in groom.layer.iter().enumerate() {
         add(format!("layer[{i}].density.map"), l.density.map.as_ref());

@@ -37,7 +37,8 @@ const NEARLY_OUT: f64 = 1e-3;
 /// How close points of a group may come to the body.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Keep {
-    /// What each node keeps, metres: the layer's offset, or less where it was groomed closer.
+    /// What each node keeps, metres: the layer's offset, or less where it was groomed closer, or as much more as the shape is
+    /// off where the mesh had to push it out.
     pub most: Vec<Pack>,
     /// 1 for nodes that were put inside (by the groom, a jump, a hold) and are on their way out.
     pub inside: Vec<Pack>,
@@ -110,15 +111,13 @@ pub fn find(
                 continue;
             };
             any[l] = true;
-            let mut keep = most;
             let Motion { x, grip, .. } = &start[i];
             // Where it was before the step, carried along by the body.
             let carried: Vec3 = std::array::from_fn(|k| x[k].0[l] + hit.velocity[k] * elapsed).into();
-            if g.keep.inside[i].0[l] > 0.0 {
-                // From the same plane; it may come out a little from there.
-                let before = hit.distance - hit.normal.dot(&(p - carried));
-                keep = most.min(before + WAY_OUT * elapsed);
-            }
+            // Deep points come out slowly: those the groom put inside, and those that the mesh has outside but its field, off by a
+            // part of a voxel in a crease, has not. At once, short hair there is thrown about at every frame.
+            let before = hit.distance - hit.normal.dot(&(p - carried));
+            let keep = most.min(before + WAY_OUT * elapsed);
             c.level.0[l] = hit.normal.dot(&p) - hit.distance + keep;
             for k in 0..3 {
                 c.normal[k].0[l] = hit.normal[k];
@@ -184,6 +183,9 @@ pub fn correct(g: &mut Group, body: &Instant<'_, '_>, asleep: [bool; LANES]) -> 
                 moved += 1;
                 g.keep.inside[i].0[l] = 0.0;
                 let to = p - hit.normal * hit.distance;
+                // Where the field has room that the mesh has not, hair would come back there in every span.
+                let most = &mut g.keep.most[i].0[l];
+                *most = most.max(body.sample(to).distance.min(NEARLY_OUT));
                 let inward = hit.normal.dot(&(g.v(i, l) - hit.velocity)).min(0.0);
                 for k in 0..3 {
                     g.motion[i].x[k].0[l] = to[k];

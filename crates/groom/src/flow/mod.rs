@@ -18,6 +18,7 @@
 //! with.
 
 mod body;
+mod coarse;
 mod element;
 mod grid;
 mod panel;
@@ -28,6 +29,7 @@ mod tree;
 pub mod trim;
 
 pub use body::{Body, FlowError};
+pub use coarse::coarse;
 pub use element::Element;
 pub(crate) use element::segment;
 pub use grid::Grid;

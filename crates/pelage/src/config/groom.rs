@@ -1,6 +1,7 @@
 //! The groom file: control hairs, how they are combed, and the layers of hair grown from maps.
 
 use super::document::{ConfigError, Document, Fixed, exactly};
+use super::guides::{Ball, Element, Panels, Primitive, Region, Shear};
 use super::look::{Clump, Collision, Curl, Emitter, Noise, Operator, Wave, WindLook};
 use super::simulate::{Material, Target, check_material};
 use schemars::JsonSchema;
@@ -92,7 +93,7 @@ fn points<'de, D: Deserializer<'de>>(d: D) -> Result<Vec<[f64; 3]>, D::Error> {
     Ok(Vec::<Fixed<f64, 3>>::deserialize(d)?.into_iter().map(|p| p.0).collect())
 }
 
-fn some_points<'de, D: Deserializer<'de>>(d: D) -> Result<Option<Vec<[f64; 3]>>, D::Error> {
+pub(super) fn some_points<'de, D: Deserializer<'de>>(d: D) -> Result<Option<Vec<[f64; 3]>>, D::Error> {
     points(d).map(Some)
 }
 
@@ -114,14 +115,14 @@ pub struct Comb {
     pub radius: Option<f64>,
     /// direction-curve: share of the radius over which the influence fades, 0 (hard) to 1. Default: 1.
     pub falloff: Option<f64>,
-    /// direction-curve, direction-map: how far hairs turn toward the direction, 0 to 1. Default: 1.
+    /// direction-curve, direction-map, field, flow: how far hairs turn toward the direction, 0 to 1. Default: 1.
     pub bend: Option<f64>,
     /// 0: the whole hair turns at its root; 1: the turn grows from root to tip. Default: 0.
     #[serde(default)]
     pub curvature: f64,
-    /// direction-curve: acts only on one side of a parting.
+    /// direction-curve, field, flow, cut: acts only on one side of a parting.
     pub parting: Option<String>,
-    /// direction-curve: the side of that parting, seen along its points from outside.
+    /// direction-curve, field, flow, cut: the side of that parting, seen along its points from outside.
     pub side: Option<Side>,
     /// direction-map: RGB map of directions (0..1 stands for -1..1); bend, lay-down, length: a map that multiplies.
     pub map: Option<MapRef>,
@@ -133,6 +134,24 @@ pub struct Comb {
     pub amount: Option<f64>,
     /// length: factor on the control hair's length.
     pub value: Option<f64>,
+    /// field: vector fields, whose sum hair follows.
+    #[serde(default)]
+    pub primitive: Vec<Primitive>,
+    /// field: hair rooted on one side of a divider sees only the fields positioned on that side.
+    #[serde(default)]
+    pub divider: Vec<Region>,
+    /// flow: what the flow is made of, besides the body.
+    #[serde(default)]
+    pub element: Vec<Element>,
+    /// flow: the body that the flow goes around. Default: none.
+    pub panels: Option<Panels>,
+    /// flow: against the flow. Default: false.
+    #[serde(default)]
+    pub reverse: bool,
+    /// cut: where.
+    pub shear: Option<Shear>,
+    /// cut: hair gets the length of the shortest way around this ball to its plane. Default: it is cut where it meets the plane.
+    pub scalp: Option<Ball>,
 }
 
 fn one() -> f64 {
@@ -153,6 +172,12 @@ pub enum CombKind {
     LayDown,
     /// Scales control hairs.
     Length,
+    /// Lets hairs follow a sum of vector fields.
+    Field,
+    /// Lets hairs follow the streamlines of an ideal flow.
+    Flow,
+    /// Cuts hairs at planes.
+    Cut,
 }
 
 /// A side of a parting.
@@ -408,7 +433,7 @@ fn default_color() -> ColorFeature {
     ColorFeature { value: [0.15, 0.08, 0.04], map: None, wrap: WrapMode::Clamp, noise: 0.1, ramp: None }
 }
 
-fn constant(value: f64) -> Feature {
+pub(super) fn constant(value: f64) -> Feature {
     Feature { value, map: None, channel: Channel::Grey, wrap: WrapMode::Clamp, noise: 0.0 }
 }
 
@@ -522,14 +547,14 @@ impl Document<GroomFile> {
 
     /// Keys that belong to another kind are refused: nobody should tune a value that nothing reads.
     fn check_comb(&self, key: &str, c: &Comb) -> Result<(), ConfigError> {
-        use CombKind::{Bend, DirectionCurve, DirectionMap, LayDown, Length};
+        use CombKind::{Bend, Cut, DirectionCurve, DirectionMap, Field, Flow, LayDown, Length};
         let given: [(&str, bool, &[CombKind]); 11] = [
             ("points", c.points.is_some(), &[DirectionCurve]),
             ("radius", c.radius.is_some(), &[DirectionCurve]),
             ("falloff", c.falloff.is_some(), &[DirectionCurve]),
-            ("bend", c.bend.is_some(), &[DirectionCurve, DirectionMap]),
-            ("parting", c.parting.is_some(), &[DirectionCurve]),
-            ("side", c.side.is_some(), &[DirectionCurve]),
+            ("bend", c.bend.is_some(), &[DirectionCurve, DirectionMap, Field, Flow]),
+            ("parting", c.parting.is_some(), &[DirectionCurve, Field, Flow, Cut]),
+            ("side", c.side.is_some(), &[DirectionCurve, Field, Flow, Cut]),
             ("map", c.map.is_some(), &[DirectionMap, Bend, LayDown, Length]),
             ("space", c.space.is_some(), &[DirectionMap]),
             ("angle", c.angle.is_some(), &[Bend]),
@@ -542,6 +567,7 @@ impl Document<GroomFile> {
             Bend => "angle",
             LayDown => "amount",
             Length => "value",
+            Field | Flow | Cut => "",
         };
         for (name, has, kinds) in given {
             if has && !kinds.contains(&c.kind) {
@@ -555,6 +581,7 @@ impl Document<GroomFile> {
                 return Err(self.error(key, format!("this kind of operation needs `{name}`"), ""));
             }
         }
+        self.check_guides(key, c)?;
         if c.points.as_ref().is_some_and(|p| p.len() < 2 || !p.iter().flatten().all(|x| x.is_finite())) {
             return Err(self.error(&format!("{key}.points"), "must be two or more finite points", ""));
         }

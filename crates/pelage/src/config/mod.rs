@@ -2,6 +2,7 @@
 
 mod document;
 mod groom;
+mod guides;
 mod keyed;
 mod light;
 mod look;
@@ -18,6 +19,7 @@ pub use groom::{
     Placement,
 };
 pub use groom::{Side, Space, WidthFeature, WrapMode};
+pub use guides::{Ball, Element, ElementKind, Falloff, Orientation, Panels, Plane, Primitive, Region, Shear};
 pub use keyed::{Amount, Key, Keyed, Vector};
 pub use light::{Light, LightKind, Shadow, ShadowQuality};
 pub use look::{

@@ -8,7 +8,7 @@ use crate::format::ply;
 use crate::project::SkinMotion;
 use crate::timeline::Timeline;
 use pelage_geom::{Bvh, Mesh, Topology, Vec3};
-use pelage_sim::body::{Closed, Deforming, Ellipsoid, Exact, Field, FieldSettings, Flow, rigid_part};
+use pelage_sim::body::{Closed, Deforming, Ellipsoid, Exact, Field, FieldSettings, Flow, Known, rigid_part};
 use pelage_sim::{Body, Bounds, Part, Rigid, Shape, Table};
 use std::rc::Rc;
 
@@ -51,8 +51,8 @@ struct Anchor {
 pub(super) struct Colliders {
     settings: FieldSettings,
     rigid: Vec<RigidSolid>,
-    /// The skin, if it deforms and is a body.
-    skin: Option<Closed>,
+    /// The skin, if it deforms and is a body, and at rest.
+    skin: Option<(Closed, End)>,
     /// `None` if the skin doesn't deform.
     anchor: Option<Anchor>,
 }
@@ -81,6 +81,13 @@ impl Surface {
 
     fn field(&self, solid: &Closed, settings: &FieldSettings, region: Option<Bounds>) -> Field {
         Field::build(&self.position, &solid.mesh.triangle, &solid.topology, &self.bvh, settings, region)
+    }
+
+    /// The field of a solid that mostly lies where it did.
+    fn field_like(&self, before: &End, solid: &Closed, settings: &FieldSettings, region: Option<Bounds>) -> Field {
+        let triangle = &solid.mesh.triangle;
+        let known = Known::new(&before.field, triangle, &before.surface.position, &self.position);
+        Field::build_with(known, &self.position, triangle, &solid.topology, &self.bvh, settings, region)
     }
 }
 
@@ -132,7 +139,9 @@ pub(super) fn colliders(
         if b.skin {
             let solid = closed(run, "the skin", &skin.mesh, &skin.topology);
             if deforms {
-                out.skin = Some(solid);
+                let surface = Surface::new(&solid, &rest);
+                let field = surface.field(&solid, &settings, region);
+                out.skin = Some((solid, End { surface, field }));
             } else {
                 let surface = Surface::new(&solid, &rest);
                 let stand = match b.kind {
@@ -226,16 +235,17 @@ impl Colliders {
         at: &Rigid,
         region: Option<Bounds>,
     ) -> Option<Rc<End>> {
-        let (skin, position) = self.skin.as_ref().zip(position)?;
+        let ((skin, rest), position) = self.skin.as_ref().zip(position)?;
         let local: Vec<[f64; 3]> = position.iter().map(|p| at.invert(Vec3::from(*p) * unit).into()).collect();
         let surface = Surface::new(skin, &local);
-        let field = surface.field(skin, &self.settings, region);
+        // From the pose at rest, not the frame before: what a frame gives does not depend on where a run begins.
+        let field = surface.field_like(rest, skin, &self.settings, region);
         Some(Rc::new(End { surface, field }))
     }
 
     /// The deforming skin over a span of `seconds` between two frames.
     pub(super) fn moving(&self, ends: [Rc<End>; 2], seconds: f64) -> Option<Moving> {
-        let triangle = &self.skin.as_ref()?.mesh.triangle;
+        let triangle = &self.skin.as_ref()?.0.mesh.triangle;
         let [a, b] = [&ends[0], &ends[1]];
         let rate = |(p, q): (&[f64; 3], &[f64; 3])| std::array::from_fn(|x| (q[x] - p[x]) / seconds);
         let velocity: Vec<[f64; 3]> = a.surface.position.iter().zip(&b.surface.position).map(rate).collect();
@@ -272,7 +282,7 @@ impl Colliders {
             let exact = Some(Exact { bvh: &r.surface.bvh, triangle: &r.solid.mesh.triangle, velocity: None });
             parts.push(Part { motion, shape, exact });
         }
-        if let Some((m, solid)) = moving.zip(self.skin.as_ref()) {
+        if let Some((m, (solid, _))) = moving.zip(self.skin.as_ref()) {
             let field = [&m.ends[0].field, &m.ends[1].field];
             let shape = Shape::Deforming(Deforming { field, flow: [&m.flow[0], &m.flow[1]], seconds: m.seconds });
             let bvh = &m.ends[1].surface.bvh;

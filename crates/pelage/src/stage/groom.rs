@@ -1,5 +1,6 @@
 //! Groom: control hairs placed on the rest skin and combed.
 
+use super::guides;
 use super::run::{Counts, Runner};
 use super::skin::Texel;
 use super::tables::{self, decode, encode, root_columns, roots_of, table, vector_columns, vectors_of};
@@ -11,8 +12,9 @@ use crate::format::ply;
 use crate::project::SkinAt;
 use pelage_geom::{Offsets, SurfacePoint, TiledMap, Vec3};
 use pelage_groom::candidates::candidates;
-use pelage_groom::comb::{CombKind, CombOp, DirectionSpace, comb};
+use pelage_groom::comb::{CombKind, CombOp, DirectionSpace, Guides, comb};
 use pelage_groom::control::{self, ControlHairs, PartingPiece, Sites};
+use pelage_groom::flow::trace::{Guard, Start};
 use pelage_groom::place::{PlaceSettings, Placement, place};
 use pelage_groom::push_up::{PushUp, push_up};
 use std::rc::Rc;
@@ -211,8 +213,22 @@ fn comb_hairs(run: &mut Runner<'_>) -> Result<ControlHairs, Error> {
     let project = run.project;
     let lines = partings(run);
     let maps = comb_maps(run)?;
-    let ops: Vec<CombOp<'_>> =
-        project.groom.value.comb.iter().zip(&maps).map(|(c, [region, map])| operation(run, c, region, map)).collect();
+    let clearance = project.groom.value.control.clearance * 1e-3 / project.shot.value.shot.meters_per_unit;
+    let guard = Guard { surface: skin.bvh(), clearance };
+    let (guides, points) = (guides::guides(run)?, hairs.points);
+    let trace: Vec<_> =
+        guides.iter().map(|g| g.as_ref().map(|g| (g, |starts: &[Start]| g.lines(points, &guard, starts)))).collect();
+    let ops: Vec<CombOp<'_>> = project
+        .groom
+        .value
+        .comb
+        .iter()
+        .zip(&maps)
+        .zip(&trace)
+        .map(|((c, [region, map]), trace)| {
+            operation(run, c, region, map, trace.as_ref().map(|(g, trace)| (*g, Guides(trace))))
+        })
+        .collect();
     let done = comb(&view(&skin), &lines, &ops, &mut hairs);
     let mut counts = Counts::from([
         ("control hairs combed".to_owned(), done.iter().map(|c| c.combed).max().unwrap_or(0) as u64),
@@ -246,7 +262,13 @@ fn comb_maps(run: &mut Runner<'_>) -> Result<Vec<[Option<TiledMap>; 2]>, Error> 
     Ok(out)
 }
 
-fn operation<'a>(run: &Runner<'_>, c: &Comb, region: &'a Option<TiledMap>, map: &'a Option<TiledMap>) -> CombOp<'a> {
+fn operation<'a>(
+    run: &Runner<'_>,
+    c: &Comb,
+    region: &'a Option<TiledMap>,
+    map: &'a Option<TiledMap>,
+    guides: Option<(&'a guides::Guides, Guides<'a>)>,
+) -> CombOp<'a> {
     let curvature = c.curvature;
     let bend = c.bend.unwrap_or(1.0);
     let kind = match c.kind {
@@ -268,6 +290,13 @@ fn operation<'a>(run: &Runner<'_>, c: &Comb, region: &'a Option<TiledMap>, map: 
         },
         Kind::Bend => CombKind::Bend { angle: c.angle.unwrap_or(0.0), map: map.as_ref(), curvature },
         Kind::LayDown => CombKind::LayDown { amount: c.amount.unwrap_or(0.0), map: map.as_ref() },
+        Kind::Field | Kind::Flow => CombKind::Follow { guides: guides.expect("made for this kind").1, bend, curvature },
+        Kind::Cut => match guides {
+            Some((guides::Guides::Shear(shear), _)) => {
+                CombKind::Cut { shear, scalp: c.scalp.as_ref().map(guides::ball) }
+            }
+            _ => unreachable!("checked: a cut has its planes"),
+        },
         Kind::Length => CombKind::Length { value: c.value.unwrap_or(1.0), map: map.as_ref() },
     };
     let parting = |name: &String| run.project.groom.value.parting.iter().position(|p| p.name == *name);
@@ -284,6 +313,7 @@ fn encode_hairs(hairs: &ControlHairs) -> Vec<u8> {
     columns.push(("side", ply::Column::I32(hairs.side.iter().map(|s| i32::from(*s)).collect())));
     columns.push(("parting", ply::Column::U32(hairs.parting.clone())));
     columns.push(("border", ply::Column::U8(hairs.border.iter().map(|b| u8::from(*b)).collect())));
+    columns.push(("cut", ply::Column::F32(hairs.cut.clone())));
     let comment = format!("control hairs, {} points each: n, du, dv along [N, dU, N x dU] from the root", hairs.points);
     encode(
         &comment,
@@ -310,5 +340,6 @@ fn decode_hairs(bytes: &[u8]) -> Option<ControlHairs> {
         side: side.iter().map(|s| *s as i8).collect(),
         parting: hair.u32("parting")?.to_vec(),
         border: border.iter().map(|b| *b != 0).collect(),
+        cut: hair.f32("cut")?.to_vec(),
     })
 }

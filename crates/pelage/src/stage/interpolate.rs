@@ -4,12 +4,12 @@ use super::look::{self, Displaced};
 use super::run::{Counts, Runner};
 use super::{What, curves, groom, instance, simulate};
 use crate::Error;
-use crate::config::Target;
+use crate::config::{CombKind, Target};
 use crate::format::mcap;
 use crate::project::SkinAt;
 use pelage_geom::Vec3;
 use pelage_groom::instance::Roots;
-use pelage_groom::interpolate::{Blend, ControlPose, interpolate, pose_controls, root_positions};
+use pelage_groom::interpolate::{Blend, ControlPose, cut_lengths, interpolate, pose_controls, root_positions};
 use rayon::prelude::*;
 use std::rc::Rc;
 
@@ -34,7 +34,10 @@ fn layer(run: &mut Runner<'_>, i: usize) -> Result<Rc<LayerHairs>, Error> {
     }
     let roots = instance::roots(run, i)?;
     let (hair, weight) = instance::weights(run, i)?;
-    let length = instance::column(run, What::Length(i), i)?;
+    let mut length = instance::column(run, What::Length(i), i)?;
+    if run.project.groom.value.comb.iter().any(|c| c.kind == CombKind::Cut) {
+        cut_lengths(&hair, &weight, &groom::combed(run)?.cut, &mut length);
+    }
     let points = run.project.base_points(i);
     let most = points.max(run.project.points(i));
     if u32::try_from(roots.id.len() * most).is_err() {

@@ -5,6 +5,7 @@ mod areas;
 mod body;
 mod clumps;
 mod explain;
+mod guides;
 mod kept;
 mod look;
 mod plan;

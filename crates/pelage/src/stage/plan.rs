@@ -90,13 +90,13 @@ pub struct Plan {
 pub(super) mod version {
     pub const CURVES: u32 = 1;
     pub const PLACE: u32 = 1;
-    pub const COMB: u32 = 1;
+    pub const COMB: u32 = 2;
     pub const CANDIDATES: u32 = 1;
     pub const ROOTS: u32 = 1;
     pub const KEPT: u32 = 1;
     pub const WEIGHTS: u32 = 1;
     pub const COLUMN: u32 = 1;
-    pub const SIMULATE: u32 = 5;
+    pub const SIMULATE: u32 = 6;
     pub const INTERPOLATE: u32 = 1;
     pub const CLUMP: u32 = 1;
     pub const LOOK: u32 = 2;
@@ -439,7 +439,34 @@ impl<'a> Reader<'a> {
         for (key, map) in [("region", &c.region), ("map", &c.map)] {
             r = r.with(map.iter().flat_map(|m| self.map(&name(key), m)));
         }
-        r
+        self.comb_guides(r, i, c)
+    }
+
+    /// What hairs follow.
+    fn comb_guides(&self, mut r: Recipe, i: usize, c: &Comb) -> Recipe {
+        let guides = [
+            ("primitive", serde_json::to_value(&c.primitive)),
+            ("divider", serde_json::to_value(&c.divider)),
+            ("element", serde_json::to_value(&c.element)),
+            ("shear", serde_json::to_value(&c.shear)),
+            ("scalp", serde_json::to_value(c.scalp)),
+        ];
+        for (key, value) in guides {
+            for (name, value) in leaves(&format!("comb[{i}].{key}"), &value.expect("plain numbers and names")) {
+                r = r.param(&name, value, self.in_groom(&name));
+            }
+        }
+        if c.reverse {
+            let name = format!("comb[{i}].reverse");
+            r = r.param(&name, true, self.in_groom(&name));
+        }
+        let Some(panels) = &c.panels else { return r };
+        let name = |key: &str| format!("comb[{i}].panels.{key}");
+        r = r.with(self.feature(&name("through"), &name("through"), &panels.through));
+        match self.project.panels.get(&i) {
+            Some(file) => r.file(&name("file"), &file.hash, file.label.clone()),
+            None => r.param(&name("most"), panels.most, self.in_groom(&name("most"))),
+        }
     }
 
     fn candidates(&self, i: usize) -> Recipe {
@@ -559,5 +586,19 @@ impl<'a> Reader<'a> {
             r = r.param(key, value, self.in_shot(&format!("shot.{key}")));
         }
         self.lights_of_files(self.along(r))
+    }
+}
+
+/// Numbers and names of a value with their keys, in order; what is not given is left out.
+fn leaves(key: &str, value: &serde_json::Value) -> Vec<(String, String)> {
+    use serde_json::Value::{Array, Null, Object};
+    match value {
+        Null => Vec::new(),
+        Object(all) => all.iter().flat_map(|(k, v)| leaves(&format!("{key}.{k}"), v)).collect(),
+        Array(all) if all.iter().any(|v| v.is_object()) => {
+            all.iter().enumerate().flat_map(|(k, v)| leaves(&format!("{key}[{k}]"), v)).collect()
+        }
+        Array(all) if all.is_empty() => Vec::new(),
+        other => vec![(key.to_owned(), other.to_string())],
     }
 }

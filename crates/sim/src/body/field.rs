@@ -7,6 +7,8 @@
 
 mod build;
 
+pub use build::Known;
+
 use super::Hit;
 use crate::Vec3;
 use pelage_geom::{Bvh, NONE, SurfacePoint, Topology};
@@ -107,6 +109,19 @@ impl Field {
         settings: &FieldSettings,
         region: Option<Bounds>,
     ) -> Self {
+        Self::build_with(None, position, triangle, topology, bvh, settings, region)
+    }
+
+    /// The same; what is closer to the parts of the mesh that lie where they did in a `known` field is taken from there.
+    pub fn build_with(
+        known: Option<Known<'_>>,
+        position: &[[f64; 3]],
+        triangle: &[[u32; 3]],
+        topology: &Topology,
+        bvh: &Bvh,
+        settings: &FieldSettings,
+        region: Option<Bounds>,
+    ) -> Self {
         let mut field = Field {
             open_edges: topology.counts.open_edges,
             not_finite: position.iter().filter(|p| !finite(p)).count(),
@@ -117,9 +132,10 @@ impl Field {
         if !field.lay_lattice(region) {
             return field;
         }
-        field.sample_corners(bvh);
-        let active = field.sample_centres(bvh);
-        field.sample_bricks(bvh, &active);
+        let known = known.and_then(|k| k.aligned(&field));
+        field.sample_corners(bvh, known.as_ref());
+        let active = field.sample_centres(bvh, known.as_ref());
+        field.sample_bricks(bvh, &active, known.as_ref().map(|k| k.field));
         field.join_bricks(&active);
         field
     }

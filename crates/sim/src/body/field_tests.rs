@@ -244,3 +244,51 @@ fn the_same_bytes_for_any_number_of_threads() {
         assert!(one.distance == more.distance && one.foot == more.foot && one.centre == more.centre);
     }
 }
+
+#[test]
+fn a_field_like_a_known_one_is_what_it_would_be_by_itself() {
+    let ball = cube_sphere(24, 0.1);
+    let topology = Topology::new(&ball);
+    let bvh = |position: &[[f64; 3]]| Bvh::build(position, &ball.triangle, &topology);
+    let settings = FieldSettings::default();
+    let at_rest = bvh(&ball.position);
+    let rest = Field::build(&ball.position, &ball.triangle, &topology, &at_rest, &settings, None);
+    // One side swells; the lattice grows with it.
+    let swollen: Vec<[f64; 3]> =
+        ball.position.iter().map(|p| [p[0] + 4.0 * (p[0] - 0.05).max(0.0) * p[0], p[1], p[2]]).collect();
+    let moved = bvh(&swollen);
+    let region = Some(([-0.09, -0.2, -0.2], [0.2; 3]));
+    for region in [None, region] {
+        let alone = Field::build(&swollen, &ball.triangle, &topology, &moved, &settings, region);
+        let known = Known::new(&rest, &ball.triangle, &ball.position, &swollen).expect("most of it stays");
+        let like = Field::build_with(Some(known), &swollen, &ball.triangle, &topology, &moved, &settings, region);
+        assert_eq!(like.cells, alone.cells);
+        assert_eq!((&like.brick, &like.centre), (&alone.brick, &alone.centre));
+        assert!(like.distance == alone.distance, "distances differ");
+        // Where several feet are as close either may stand.
+        let apart = like.corner_foot.iter().zip(&alone.corner_foot).filter(|(a, b)| a != b).count();
+        assert!(apart * 100 < like.corner_foot.len(), "feet of {apart} corners differ");
+    }
+    // Less than a quarter stays: nothing is taken over.
+    let turned: Vec<[f64; 3]> = ball.position.iter().map(|p| [p[1], -p[0], p[2] + 1e-3]).collect();
+    assert!(Known::new(&rest, &ball.triangle, &ball.position, &turned).is_none());
+}
+
+/// What a known field would give wrongly if more were taken over than may be is seen.
+#[test]
+fn what_moved_closer_is_sampled_again() {
+    let ball = cube_sphere(12, 0.1);
+    let topology = Topology::new(&ball);
+    let settings = FieldSettings::default();
+    let at_rest = Bvh::build(&ball.position, &ball.triangle, &topology);
+    let rest = Field::build(&ball.position, &ball.triangle, &topology, &at_rest, &settings, None);
+    // A thorn: one vertex moves far out.
+    let mut thorn = ball.position.clone();
+    let top = (0..thorn.len()).max_by(|a, b| thorn[*a][1].total_cmp(&thorn[*b][1])).unwrap();
+    thorn[top][1] += 0.08;
+    let bvh = Bvh::build(&thorn, &ball.triangle, &topology);
+    let known = Known::new(&rest, &ball.triangle, &ball.position, &thorn).expect("most of it stays");
+    let like = Field::build_with(Some(known), &thorn, &ball.triangle, &topology, &bvh, &settings, None);
+    let alone = Field::build(&thorn, &ball.triangle, &topology, &bvh, &settings, None);
+    assert!(like.distance == alone.distance && like.brick == alone.brick);
+}

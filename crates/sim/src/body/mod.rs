@@ -13,7 +13,7 @@ mod testing;
 pub use closed::Closed;
 pub use deforming::Deforming;
 pub use ellipsoid::Ellipsoid;
-pub use field::{Bounds, Field, FieldSettings, Flow};
+pub use field::{Bounds, Field, FieldSettings, Flow, Known};
 pub use rigid_fit::{RigidFit, rigid_fit, rigid_part};
 pub use table::Table;
 

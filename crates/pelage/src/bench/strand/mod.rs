@@ -1,5 +1,6 @@
 //! One hair against closed forms: error against processor time for each model, step and number of segments.
 
+mod friction;
 mod motion;
 mod released;
 mod rest;
@@ -23,6 +24,7 @@ fn run(bench: &mut Bench<'_>) -> Result<Findings, Error> {
     released::study(bench, &mut findings)?;
     rest::study(bench, &mut findings)?;
     motion::study(bench, &mut findings)?;
+    friction::study(bench, &mut findings)?;
     Ok(findings)
 }
 
@@ -190,11 +192,40 @@ fn logarithmic(title: &str, axes: [&str; 2], series: Vec<Series>) -> String {
     Plot { title, axes, log: [true; 2], series }.svg()
 }
 
+/// Error against processor time, a line a model and size.
+fn work_precision(title: &str, error: &str, rows: &[Row]) -> String {
+    let lines = lines(rows, Finer::Segments, |r| r.seconds, |r| r.error);
+    logarithmic(&format!("{title}: what it costs"), ["processor s a hair", error], lines)
+}
+
 /// The table of a case.
 fn section(title: &str, error: &'static str, own: &'static str, rows: &[Row]) -> Section {
     let mut section = Section::new(title, &[error, own, "order", "processor s a hair"]);
     section.rows = rows.iter().map(|r| (r.point.clone(), vec![r.error, r.own, r.order, r.seconds])).collect();
     section
+}
+
+impl Section {
+    /// A row that searches by halving, so many times, between 0.9 and 1.1 for the part of a threshold from which on something
+    /// happens: where it does not, and where it does.
+    fn threshold(
+        &mut self,
+        bench: &mut Bench<'_>,
+        point: &str,
+        halvings: u32,
+        happens: impl Fn(f64) -> Result<bool, SimError>,
+    ) -> Result<(), Error> {
+        self.row(bench, &format!("{point}/{halvings}-halvings"), || {
+            let (mut low, mut high) = (0.9, 1.1);
+            for _ in 0..halvings {
+                let middle = 0.5 * (low + high);
+                let over = happens(middle).map_err(refused)?;
+                if over { high = middle } else { low = middle }
+            }
+            Ok([low, high])
+        })?;
+        Ok(())
+    }
 }
 
 /// The middle of the numbers that are some; NaN of none.

@@ -1,6 +1,6 @@
 //! Hairs that swing: frequencies, periods and damping.
 
-use super::{At, Case, Clock, Finer, HAIRS, Row, lines, logarithmic, median, second_order, section};
+use super::{At, Case, Clock, Finer, HAIRS, Row, lines, logarithmic, median, second_order, section, work_precision};
 use crate::Error;
 use crate::bench::{Bench, Findings};
 use pelage_sim::reference::{chain, vibration};
@@ -254,6 +254,7 @@ pub(super) fn study(bench: &mut Bench<'_>, findings: &mut Findings) -> Result<()
             series.push(second_order(first, 8.0));
         }
         s.plots.push(logarithmic(f.title, [axis, f.error], series));
+        s.plots.push(work_precision(f.title, f.error, &rows));
         findings.sections.push(s);
         all.extend(rows);
     }

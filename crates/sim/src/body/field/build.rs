@@ -2,7 +2,7 @@
 
 use super::{Bounds, CELLS, Field, NEAR, NOWHERE, SAMPLES, SIDE, finite, split};
 use crate::Vec3;
-use pelage_geom::{Bvh, Closest, NONE, SurfacePoint};
+use pelage_geom::{Bvh, Closest, Mesh, NONE, SurfacePoint, Topology};
 use rayon::prelude::*;
 
 /// Voxels over which exact distances go over into coarse ones beyond the band. With less than one the gradient there is
@@ -16,12 +16,83 @@ const NODES: usize = CELLS / 2 + 1;
 /// seconds, and a body scaled by a thousand doesn't fill the memory. A standing figure at 4 mm needs 30,000.
 pub(super) const MOST_CELLS: f64 = 131_072.0;
 
+/// Vertices that moved by no more, metres, are where they were: what coordinates round to.
+const SAME: f64 = 1e-9;
+
+/// Least part of the triangles that stay for whose sake a known field is asked: below, asking costs as much as it saves.
+const WORTHWHILE: f64 = 0.25;
+
 /// What is known of a sample while building: signed distance, foot, and some point of the surface.
 #[derive(Clone, Copy)]
 struct Node {
     distance: f64,
     foot: SurfacePoint,
     position: Vec3,
+}
+
+/// A field of the same mesh in another pose, and what of the mesh lies elsewhere now: what is closer to the rest need not be
+/// sampled again.
+pub struct Known<'a> {
+    pub(super) field: &'a Field,
+    /// Triangles that lie elsewhere, as they were and as they are.
+    moved: Bvh,
+    /// Cells from the lowest of the field that is built to the lowest of the known one.
+    offset: [i64; 3],
+}
+
+impl<'a> Known<'a> {
+    /// `field` of the triangles at the positions `before`, most of which (at least [`WORTHWHILE`]) are within [`SAME`] of where
+    /// they are `now`; otherwise nothing, as there is little to gain.
+    pub fn new(field: &'a Field, triangle: &[[u32; 3]], before: &[[f64; 3]], now: &[[f64; 3]]) -> Option<Self> {
+        let same = |v: &u32| {
+            let (a, b) = (before[*v as usize], now[*v as usize]);
+            (0..3).all(|x| (a[x] - b[x]).abs() <= SAME)
+        };
+        let moved: Vec<[u32; 3]> = triangle.iter().filter(|t| !t.iter().all(same)).copied().collect();
+        if (triangle.len() - moved.len()) as f64 <= WORTHWHILE * triangle.len() as f64 {
+            return None;
+        }
+        let corners = [before, now].into_iter().flat_map(|p| moved.iter().flatten().map(|v| p[*v as usize]));
+        let position: Vec<[f64; 3]> = corners.collect();
+        let triangle = (0..2 * moved.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+        let mesh = Mesh { position, triangle, ..Mesh::default() };
+        let moved = Bvh::build(&mesh.position, &mesh.triangle, &Topology::new(&mesh));
+        Some(Known { field, moved, offset: [0; 3] })
+    }
+
+    /// Where the lattices lie to each other; nothing of use if their cells are of different size.
+    pub(super) fn aligned(mut self, field: &Field) -> Option<Self> {
+        let size = field.cell_size();
+        let cells = |i: usize| ((field.domain.0[i] - self.field.domain.0[i]) / size).round() as i64;
+        self.offset = std::array::from_fn(cells);
+        (self.field.settings == field.settings && self.field.cells[0] > 0).then_some(self)
+    }
+
+    /// The same place in the known lattice of `size` cells or corners.
+    fn same(&self, at: [usize; 3], size: [usize; 3]) -> Option<[usize; 3]> {
+        let there: [i64; 3] = std::array::from_fn(|i| at[i] as i64 + self.offset[i]);
+        let within = (0..3).all(|i| 0 <= there[i] && there[i] < size[i] as i64);
+        within.then(|| there.map(|i| i as usize))
+    }
+
+    /// Number of a corner of the known lattice from which nothing that moved is closer than the surface was.
+    fn corner(&self, at: [usize; 3], p: Vec3) -> Option<usize> {
+        let there = self.same(at, self.field.cells.map(|n| n + 1))?;
+        let k = self.field.coarse(there, [0.0; 3]).base;
+        let distance = f64::from(self.field.distance[k].abs());
+        self.moved.closest(p, distance * (1.0 + 1e-6) + SAME).is_none().then_some(k)
+    }
+
+    /// Number of a cell of the known lattice from none of whose points anything that moved is closer than the surface was.
+    fn cell(&self, at: [usize; 3], centre: Vec3) -> Option<usize> {
+        let there = self.same(at, self.field.cells)?;
+        let k = self.field.index(there);
+        // From a point of the cell the surface is no farther than the centre's distance and the way to it, what moved no
+        // nearer than its distance from the centre less that way.
+        let way = 3f64.sqrt() * self.field.cell_size();
+        let distance = f64::from(self.field.centre[k].abs());
+        self.moved.closest(centre, (distance + way) * (1.0 + 1e-5) + SAME).is_none().then_some(k)
+    }
 }
 
 impl Field {
@@ -64,48 +135,65 @@ impl Field {
     }
 
     /// Exact distances at the coarse corners.
-    pub(super) fn sample_corners(&mut self, bvh: &Bvh) {
+    pub(super) fn sample_corners(&mut self, bvh: &Bvh, known: Option<&Known<'_>>) {
         let [nx, ny, _] = self.cells.map(|n| n + 1);
         let size = self.cell_size();
         let rows: Vec<usize> = (0..self.corners() / nx).collect();
         let low = self.domain.0;
-        let sampled: Vec<Vec<Closest>> = rows
+        let sampled: Vec<Vec<(f32, SurfacePoint, [f32; 3])>> = rows
             .par_iter()
             .map(|&row| {
                 let mut limit = f64::INFINITY;
                 let corner =
                     |i: usize| Vec3::from(low) + Vec3::new(i as f64, (row % ny) as f64, (row / ny) as f64) * size;
                 let at = |i: usize| {
-                    let found = query(bvh, corner(i), limit);
-                    limit = (corner(i + 1) - found.position).norm();
+                    let same = known.and_then(|k| Some((k.field, k.corner([i, row % ny, row / ny], corner(i))?)));
+                    let found = match same {
+                        Some((f, k)) => (f.distance[k], f.foot[k], f.corner_foot[k]),
+                        None => {
+                            let c = query(bvh, corner(i), limit);
+                            (
+                                c.signed_distance as f32,
+                                c.point,
+                                [c.position.x, c.position.y, c.position.z].map(|x| x as f32),
+                            )
+                        }
+                    };
+                    // Feet are rounded: a search that finds nothing within the limit is done again without.
+                    limit = (corner(i + 1) - Vec3::from(found.2.map(f64::from))).norm();
                     found
                 };
                 (0..nx).map(at).collect()
             })
             .collect();
-        for c in sampled.into_iter().flatten() {
-            self.distance.push(c.signed_distance as f32);
-            self.foot.push(c.point);
-            self.corner_foot.push([c.position.x as f32, c.position.y as f32, c.position.z as f32]);
+        for (distance, foot, position) in sampled.into_iter().flatten() {
+            self.distance.push(distance);
+            self.foot.push(foot);
+            self.corner_foot.push(position);
         }
     }
 
     /// Distances at the cells' centres; returns the cells that need a brick: all others lie outside the band and the
-    /// blend with all their points, on one side of the surface.
-    pub(super) fn sample_centres(&mut self, bvh: &Bvh) -> Vec<usize> {
+    /// blend with all their points, on one side of the surface. With each comes its number in the known field, if it is the same
+    /// there.
+    pub(super) fn sample_centres(&mut self, bvh: &Bvh, known: Option<&Known<'_>>) -> Vec<(usize, Option<usize>)> {
         let size = self.cell_size();
         let radius = 0.5 * 3f64.sqrt() * size;
-        let centres: Vec<f64> = (0..self.cells.iter().product())
+        let needs = |d: f64| d.abs() <= radius + self.width(d) + BLEND * self.settings.voxel;
+        let centres: Vec<(f32, bool, Option<usize>)> = (0..self.cells.iter().product())
             .into_par_iter()
             .map(|cell: usize| {
                 let centre = self.corner_of(cell) + Vec3::repeat(0.5 * size);
+                if let Some((k, same)) = known.and_then(|k| Some((k, k.cell(self.cell_at(cell), centre)?))) {
+                    return (k.field.centre[same], k.field.brick[same] != NONE, Some(same));
+                }
                 let foot = self.corner_foot[self.coarse(self.cell_at(cell), [0.0; 3]).base].map(f64::from);
-                query(bvh, centre, (centre - Vec3::from(foot)).norm() * (1.0 + 1e-6)).signed_distance
+                let d = query(bvh, centre, (centre - Vec3::from(foot)).norm() * (1.0 + 1e-6)).signed_distance;
+                ((d - d.abs() * 1e-6) as f32, needs(d), None)
             })
             .collect();
-        self.centre = centres.iter().map(|&d| (d - d.abs() * 1e-6) as f32).collect();
-        let needs = |d: f64| d.abs() <= radius + self.width(d) + BLEND * self.settings.voxel;
-        (0..centres.len()).filter(|&cell| needs(centres[cell])).collect()
+        self.centre = centres.iter().map(|c| c.0).collect();
+        centres.iter().enumerate().filter(|(_, c)| c.1).map(|(cell, c)| (cell, c.2)).collect()
     }
 
     /// Lowest corner of a cell.
@@ -119,16 +207,38 @@ impl Field {
     }
 
     /// Fills the bricks of the `active` cells with what each owns: samples but those on faces that the next cell owns.
-    pub(super) fn sample_bricks(&mut self, bvh: &Bvh, active: &[usize]) {
+    pub(super) fn sample_bricks(&mut self, bvh: &Bvh, active: &[(usize, Option<usize>)], known: Option<&Field>) {
         self.brick = vec![NONE; self.centre.len()];
-        for (k, &cell) in active.iter().enumerate() {
+        for (k, &(cell, _)) in active.iter().enumerate() {
             self.brick[cell] = (self.corners() + k * SAMPLES) as u32;
         }
-        let bricks: Vec<_> = active.par_iter().map(|&cell| self.sample_brick(bvh, cell)).collect();
+        let one = |&(cell, same): &(usize, Option<usize>)| {
+            let same = known.zip(same).filter(|(k, there)| self.joins_alike(cell, k, *there));
+            same.map_or_else(|| self.sample_brick(bvh, cell), |(k, there)| k.brick_at(there))
+        };
+        let bricks: Vec<_> = active.par_iter().map(one).collect();
         for (distance, foot) in bricks {
             self.distance.extend(distance);
             self.foot.extend(foot);
         }
+    }
+
+    /// Samples of a brick as they are.
+    fn brick_at(&self, cell: usize) -> ([f32; SAMPLES], [SurfacePoint; SAMPLES]) {
+        let at = self.brick[cell] as usize..self.brick[cell] as usize + SAMPLES;
+        let whole = "a brick of all its samples";
+        (self.distance[at.clone()].try_into().expect(whole), self.foot[at].try_into().expect(whole))
+    }
+
+    /// True if a cell owns the same samples as one of another field and cells before both have bricks where the other's have.
+    fn joins_alike(&self, cell: usize, other: &Field, there: usize) -> bool {
+        let (b, c) = (self.cell_at(cell), other.cell_at(there));
+        let before = |f: &Field, at: [usize; 3], set: usize| {
+            let back: [usize; 3] = std::array::from_fn(|a| set >> a & 1);
+            let within = (0..3).all(|a| at[a] >= back[a]);
+            within.then(|| f.brick[f.index(std::array::from_fn(|a| at[a] - back[a]))] != NONE)
+        };
+        self.owned(cell) == other.owned(there) && (1..8).all(|set| before(self, b, set) == before(other, c, set))
     }
 
     /// Samples what a brick owns: every second sample along each axis first, then what lies between.
@@ -230,10 +340,10 @@ impl Field {
     }
 
     /// Fills the faces that the next cells own: from their bricks, or from the coarse corners where they have none.
-    pub(super) fn join_bricks(&mut self, active: &[usize]) {
+    pub(super) fn join_bricks(&mut self, active: &[(usize, Option<usize>)]) {
         let faces: Vec<Vec<(u32, f32, SurfacePoint)>> = active
             .par_iter()
-            .map(|&cell| {
+            .map(|&(cell, _)| {
                 let (b, own) = (self.cell_at(cell), self.owned(cell));
                 let mut face = Vec::new();
                 for n in 0..SAMPLES {
@@ -256,7 +366,7 @@ impl Field {
                 face
             })
             .collect();
-        for (&cell, face) in active.iter().zip(faces) {
+        for (&(cell, _), face) in active.iter().zip(faces) {
             let base = self.brick[cell] as usize;
             for (n, d, foot) in face {
                 self.distance[base + n as usize] = d;

@@ -1,0 +1,232 @@
+//! Fields that control hairs are combed along.
+
+use super::groom;
+use super::look::barrier;
+use super::run::Runner;
+use super::skin::Texel;
+use crate::Error;
+use crate::config::{Ball, Comb, CombKind, Element, ElementKind, Orientation, Panels, Plane, Primitive, Region, Shear};
+use crate::format::ply;
+use nalgebra::UnitQuaternion;
+use pelage_geom::{Bvh, Mesh, TiledMap, Vec3, mesh};
+use pelage_groom::field::{self, Falloff, GuideField, lengths};
+use pelage_groom::flow::trace::{Guard, Lines, Start, Trace, trace};
+use pelage_groom::flow::{self, Body, Fast, Grid, OPENING, coarse};
+
+/// Cells along the longest side of the box that lines can come to: velocities between are off by 1e-4 in the middle, and more
+/// where the flow nearly rests. Twice as many take eight times as long to fill.
+const CELLS: f64 = 60.0;
+
+/// Lines from which on a grid is worth filling.
+const MANY: usize = 2000;
+
+/// What an operation lets hairs follow, or where it cuts them.
+pub(super) enum Guides {
+    Field(GuideField),
+    Flow(Flow),
+    Shear(lengths::Shear),
+}
+
+/// A flow with its body solved.
+pub(super) struct Flow {
+    element: Vec<flow::Element>,
+    body: Option<(Body, Vec<f64>)>,
+    reverse: bool,
+}
+
+/// What the operations of a groom let hairs follow, or where they cut them; `None` for other operations.
+pub(super) fn guides(run: &mut Runner<'_>) -> Result<Vec<Option<Guides>>, Error> {
+    let project = run.project;
+    let each = project.groom.value.comb.iter().enumerate();
+    each.map(|(i, c)| match c.kind {
+        CombKind::Field => Ok(Some(Guides::Field(field_of(c)))),
+        CombKind::Flow => Ok(Some(Guides::Flow(flow_of(run, i, c)?))),
+        CombKind::Cut => Ok(c.shear.as_ref().map(|s| Guides::Shear(shear(s)))),
+        _ => Ok(None),
+    })
+    .collect()
+}
+
+impl Guides {
+    /// Lines of `points` points from the roots of hairs, out of the skin.
+    pub(super) fn lines(&self, points: usize, guard: &Guard<'_>, starts: &[Start]) -> Lines {
+        let settings = Trace { points, step: 0.0, reverse: false, slow: 0.0 };
+        match self {
+            Guides::Field(field) => field.trace(starts, &settings, Some(guard)),
+            Guides::Shear(_) => Lines::default(),
+            Guides::Flow(f) => f.lines(&Trace { reverse: f.reverse, ..settings }, guard, starts),
+        }
+    }
+}
+
+impl Flow {
+    fn lines(&self, settings: &Trace, guard: &Guard<'_>, starts: &[Start]) -> Lines {
+        let Some((body, strength)) = &self.body else {
+            let flow = flow::Flow { elements: &self.element, ..flow::Flow::default() };
+            return trace(|_, p| flow.velocity(p), starts, settings, Some(guard));
+        };
+        let fast = Fast::new(body.flow(&self.element, strength), OPENING);
+        let reach = starts.iter().map(|s| s.length).fold(0.0, f64::max);
+        let none = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
+        let (low, high) = starts.iter().fold(none, |(low, high), s| (low.inf(&s.at), high.sup(&s.at)));
+        let (low, high) = (low.add_scalar(-reach), high.add_scalar(reach));
+        let grid = (starts.len() >= MANY).then(|| Grid::fill(&fast, low, high, (high - low).max() / CELLS).ok());
+        match grid.flatten() {
+            Some(grid) => trace(|_, p| grid.velocity(p), starts, settings, Some(guard)),
+            None => trace(|_, p| fast.velocity(p), starts, settings, Some(guard)),
+        }
+    }
+}
+
+fn turned(degrees: [f64; 3]) -> UnitQuaternion<f64> {
+    let [x, y, z] = degrees.map(f64::to_radians);
+    let about = |axis: Vec3, angle: f64| {
+        let half = 0.5 * angle;
+        let v = axis * libm::sin(half);
+        UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(libm::cos(half), v.x, v.y, v.z))
+    };
+    about(Vec3::z(), z) * about(Vec3::y(), y) * about(Vec3::x(), x)
+}
+
+fn points(p: Option<&Vec<[f64; 3]>>) -> Vec<Vec3> {
+    p.into_iter().flatten().map(|p| Vec3::from(*p)).collect()
+}
+
+fn vector(v: Option<[f64; 3]>) -> Vec3 {
+    Vec3::from(v.unwrap_or_default())
+}
+
+fn field_of(c: &Comb) -> GuideField {
+    GuideField {
+        primitives: c.primitive.iter().map(primitive).collect(),
+        dividers: c.divider.iter().map(region).collect(),
+    }
+}
+
+fn primitive(p: &Primitive) -> field::Primitive {
+    let orientation = match p.orientation {
+        Orientation::Constant => field::Orientation::Constant { direction: vector(p.direction) },
+        Orientation::Radial => field::Orientation::Radial,
+        Orientation::Around => field::Orientation::Around,
+        Orientation::Along => field::Orientation::Along { points: points(p.points.as_ref()) },
+        Orientation::Divide => field::Orientation::Divide,
+        Orientation::Roller => field::Orientation::Roller {
+            points: points(p.points.as_ref()),
+            radius: p.radius.unwrap_or(1.0),
+            pitch: p.pitch.unwrap_or(0.1),
+        },
+        Orientation::Wave => field::Orientation::Wave {
+            along: vector(p.direction),
+            across: vector(p.sway),
+            wavelength: p.wavelength.unwrap_or(1.0),
+            amplitude: p.amplitude.unwrap_or(0.5),
+            phase: p.phase.unwrap_or(0.0).to_radians(),
+        },
+    };
+    let falloff = match &p.falloff {
+        None => Falloff::Uniform,
+        Some(f) => match f.exponent {
+            Some(exponent) => Falloff::InversePower { exponent, near: f.near.unwrap_or(1.0) },
+            None => Falloff::Smooth {
+                r0: f.from.unwrap_or(0.0),
+                r1: f.to.unwrap_or(1.0),
+                s0: f.inner.unwrap_or(1.0),
+                s1: f.outer.unwrap_or(0.0),
+            },
+        },
+    };
+    field::Primitive {
+        position: p.position.into(),
+        rotation: turned(p.turn),
+        strength: p.strength,
+        falloff,
+        shape: p.shape.into(),
+        domain: p.domain.iter().map(region).collect(),
+        across: p.across,
+        ..field::Primitive::new(orientation)
+    }
+}
+
+fn region(r: &Region) -> field::Region {
+    match (r.centre, r.radii) {
+        (Some(centre), Some(radii)) => {
+            field::Region::Ellipsoid { centre: centre.into(), rotation: turned(r.turn), radii: radii.into() }
+        }
+        _ => field::Region::HalfSpace { point: vector(r.point), normal: vector(r.normal) },
+    }
+}
+
+fn plane(p: Option<Plane>) -> lengths::Plane {
+    let p = p.expect("checked: a plane");
+    lengths::Plane { point: p.point.into(), normal: p.normal.into() }
+}
+
+fn shear(s: &Shear) -> lengths::Shear {
+    match (&s.front, &s.back) {
+        (Some(front), Some(back)) => {
+            lengths::Shear::Part { plane: plane(s.part), front: Box::new(shear(front)), back: Box::new(shear(back)) }
+        }
+        _ => lengths::Shear::Cut { plane: plane(s.at) },
+    }
+}
+
+/// The ball that stands for the scalp.
+pub(super) fn ball(b: &Ball) -> lengths::Sphere {
+    lengths::Sphere { centre: b.centre.into(), radius: b.radius }
+}
+
+fn element(e: &Element) -> flow::Element {
+    let (at, strength, core) = (vector(e.at), e.strength, e.core);
+    match e.kind {
+        ElementKind::Stream => flow::Element::Stream { velocity: vector(e.velocity) },
+        ElementKind::Source => flow::Element::Source { at, strength, core },
+        ElementKind::Vortex => flow::Element::Vortex { at, axis: vector(e.axis), strength, core },
+        ElementKind::Filament => flow::Element::Filament { points: points(e.points.as_ref()), strength, core },
+    }
+}
+
+fn flow_of(run: &mut Runner<'_>, i: usize, c: &Comb) -> Result<Flow, Error> {
+    let element: Vec<flow::Element> = c.element.iter().map(element).collect();
+    let body = c.panels.as_ref().map(|p| body_of(run, i, p, &element)).transpose()?;
+    Ok(Flow { element, body, reverse: c.reverse })
+}
+
+/// Panels of a flow with the strengths that let through what is asked.
+fn body_of(run: &mut Runner<'_>, i: usize, p: &Panels, element: &[flow::Element]) -> Result<(Body, Vec<f64>), Error> {
+    let skin = groom::skin(run)?;
+    let panels = match run.project.panels.get(&i) {
+        Some(file) => ply::read_mesh(&file.path)?.mesh,
+        None => {
+            let closed = barrier(run)?;
+            let position = closed.closed.extend(&skin.mesh.position);
+            let whole = Mesh { position, triangle: closed.closed.mesh.triangle.clone(), ..Mesh::default() };
+            coarse(&whole, &normals(&whole), p.most)
+        }
+    };
+    let map = p.through.map().map(|m| run.map(&m, Texel::Value)).transpose()?;
+    let wrong = |e: flow::FlowError| {
+        let help = "change `panels.most`, or give a closed mesh as `panels.file`";
+        Error::from(run.project.groom.error(&format!("comb[{i}].panels"), e.to_string(), help))
+    };
+    let body = Body::new(&panels.position, &panels.triangle).map_err(wrong)?;
+    let through: Vec<f64> =
+        body.panels().iter().map(|panel| speed(&skin.mesh, skin.bvh(), p, map.as_ref(), panel.centre)).collect();
+    let strength = body.solve(element, &through).map_err(wrong)?;
+    Ok((body, strength))
+}
+
+/// Speed through the skin where it is nearest to a point.
+fn speed(skin: &Mesh, bvh: &Bvh, p: &Panels, map: Option<&TiledMap>, at: Vec3) -> f64 {
+    let painted = map.zip(bvh.closest(at, f64::INFINITY)).map(|(map, near)| f64::from(map.value(skin.uv(&near.point))));
+    p.through.value * painted.unwrap_or(1.0)
+}
+
+/// Unit normals of the vertices of a mesh, weighted by area.
+fn normals(whole: &Mesh) -> Vec<Vec3> {
+    let mut normal = vec![Vec3::zeros(); whole.position.len()];
+    for t in &whole.triangle {
+        let [a, b, c] = mesh::corners(&whole.position, *t);
+        t.iter().for_each(|v| normal[*v as usize] += (b - a).cross(&(c - a)));
+    }
+    normal.into_iter().map(|n| n.try_normalize(0.0).unwrap_or_default()).collect()
+}
