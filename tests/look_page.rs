@@ -34,8 +34,23 @@ const SECTIONS: [(&str, &str, &str); 19] = [
     ("`[[comb]]`", "comb", "Comb"),
 ];
 
-/// Tables of a groom file that are not shown: where hair stands, what it is made of, where a map is.
-const ELSEWHERE: [&str; 6] = ["Control", "Placement", "Parting", "Material", "MapRef", "Key"];
+/// Tables of a groom file that are not shown: where hair stands, what it is made of, where a map is, and what styles are made of.
+const ELSEWHERE: [&str; 14] = [
+    "Control",
+    "Placement",
+    "Parting",
+    "Material",
+    "MapRef",
+    "Key",
+    "Primitive",
+    "Falloff",
+    "Region",
+    "Element",
+    "Panels",
+    "Shear",
+    "Plane",
+    "Ball",
+];
 
 /// Where the part of the page begins that is made here.
 const BEGINS: &str = "## Every parameter\n";

@@ -544,4 +544,11 @@ pub const WITHOUT: &[(&str, &str)] = &[
     ("emitter.file", "particles of another program"),
     ("comb.parting", "goes with `side`"),
     ("comb.value", "finished hairs have the length of their layer"),
+    ("comb.primitive", "shown in the styles of the gallery"),
+    ("comb.divider", "hides fields from hair on its other side"),
+    ("comb.element", "shown in the styles of the gallery"),
+    ("comb.panels", "shown in the styles of the gallery"),
+    ("comb.reverse", "turns a flow round"),
+    ("comb.shear", "shown in the styles of the gallery"),
+    ("comb.scalp", "what a cut goes by"),
 ];

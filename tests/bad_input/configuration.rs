@@ -319,3 +319,68 @@ fn arguments_that_do_not_fit() {
     }
     corpus.finish();
 }
+
+#[test]
+fn fields_flows_and_cuts() {
+    let mut corpus = Corpus::new();
+    for (comb, words) in [
+        ("kind = \"field\"", "comb[1]|needs `primitive`"),
+        ("kind = \"flow\"", "comb[1]|needs `element`"),
+        ("kind = \"cut\"", "comb[1]|needs `shear`"),
+        ("kind = \"bend\"\nangle = 1.0\nreverse = true", "comb[1].reverse|not read"),
+        ("kind = \"flow\"\nprimitive = [{ orientation = \"radial\" }]", "comb[1].primitive|not read"),
+        ("kind = \"field\"\nprimitive = [{ orientation = \"constant\" }]", "primitive[0]|needs `direction`"),
+        ("kind = \"field\"\nprimitive = [{ orientation = \"radial\", radius = 1.0 }]", "radius|not read"),
+        ("kind = \"field\"\nprimitive = [{ orientation = \"radial\", strength = nan }]", "strength|out of range"),
+        ("kind = \"field\"\nprimitive = [{ orientation = \"radial\", shape = [1.0, 0.0, 1.0] }]", "shape|out of range"),
+        (
+            "kind = \"field\"\nprimitive = [{ orientation = \"radial\", falloff = { from = 2.0, to = 1.0 } }]",
+            "falloff.to",
+        ),
+        (
+            "kind = \"field\"\nprimitive = [{ orientation = \"radial\", falloff = { exponent = 2.0, to = 1.0 } }]",
+            "falloff.to",
+        ),
+        (
+            "kind = \"field\"\nprimitive = [{ orientation = \"along\", points = [[0.0, 0.0, 0.0]] }]",
+            "points|two or more",
+        ),
+        (
+            "kind = \"field\"\nprimitive = [{ orientation = \"radial\" }]\ndivider = [{ point = [0.0, 0.0, 0.0] }]",
+            "normal",
+        ),
+        (
+            "kind = \"field\"\nprimitive = [{ orientation = \"radial\" }]\ndivider = [{ centre = [0.0, 0.0, 0.0], radii = [1.0, 1.0, 0.0] }]",
+            "radii",
+        ),
+        ("kind = \"flow\"\nelement = [{ kind = \"source\" }]", "element[0]|needs `at`"),
+        (
+            "kind = \"flow\"\nelement = [{ kind = \"vortex\", at = [0.0, 0.0, 0.0], axis = [0.0, 0.0, 0.0] }]",
+            "axis|direction",
+        ),
+        ("kind = \"flow\"\nelement = [{ kind = \"stream\", velocity = [0.0, inf, 0.0] }]", "velocity|out of range"),
+        ("kind = \"flow\"\npanels = { most = 3 }", "panels.most|20 to"),
+        ("kind = \"flow\"\npanels = { through = { value = 1.0, noise = 0.1 } }", "through.noise|not read"),
+        ("kind = \"flow\"\npanels = { file = \"none.ply\" }", "none.ply"),
+        ("kind = \"flow\"\npanels = { through = { value = 1.0, map = \"none.png\" } }", "none.png"),
+        ("kind = \"cut\"\nshear = {}", "shear|needs `at`"),
+        ("kind = \"cut\"\nshear = { part = { point = [0.0, 0.0, 0.0], normal = [1.0, 0.0, 0.0] } }", "needs `front`"),
+        (
+            "kind = \"cut\"\nshear = { at = { point = [0.0, 0.0, 0.0], normal = [0.0, 0.0, 0.0] } }",
+            "shear.at|direction",
+        ),
+        (
+            "kind = \"cut\"\nscalp = { centre = [0.0, 0.0, 0.0], radius = -1.0 }\nshear = { at = { point = [0.0, 0.0, 0.0], normal = \
+             [0.0, 1.0, 0.0] } }",
+            "scalp.radius|out of range",
+        ),
+    ] {
+        corpus.refuse_edit(
+            GROOM,
+            "[[layer]]",
+            &format!("[[comb]]\n{comb}\n\n[[layer]]"),
+            &format!("ball.toml|{words}"),
+        );
+    }
+    corpus.finish();
+}

@@ -96,6 +96,8 @@ pub struct DepenetrateCounts {
     pub moved: f64,
     /// Greatest change of a segment's length of a hair that was cleared, as a fraction of it.
     pub stretched: f64,
+    /// Segments looked at in all sweeps: what it costs.
+    pub looks: u64,
 }
 
 impl DepenetrateCounts {
@@ -109,6 +111,7 @@ impl DepenetrateCounts {
             deepest: [0, 1].map(|i| self.deepest[i].max(other.deepest[i])),
             moved: self.moved.max(other.moved),
             stretched: self.stretched.max(other.stretched),
+            looks: self.looks + other.looks,
         }
     }
 }
@@ -201,6 +204,8 @@ struct Job<'a> {
     grows_inside: bool,
     /// What a coordinate may be off by as stored, in all.
     grain: f64,
+    /// Segments looked at.
+    looks: u64,
 }
 
 impl<'a> Job<'a> {
@@ -225,6 +230,7 @@ impl<'a> Job<'a> {
             held: if root > SHALLOW * held { held.max(2.0 * root) } else { held },
             grows_inside,
             grain: f64::from(4.0 * f32::EPSILON * largest),
+            looks: 0,
             line,
             stored,
         }
@@ -279,6 +285,7 @@ impl<'a> Job<'a> {
             deepest,
             moved: far,
             stretched: if uncleared { 0.0 } else { stretched },
+            looks: self.looks,
         }
     }
 
@@ -425,6 +432,7 @@ impl<'a> Job<'a> {
     /// Once along the hair: whether anything moved, and whether something inside could not be.
     fn sweep(&mut self, stretch: f64) -> (bool, bool) {
         let (mut moved, mut stuck, mut before, mut gone) = (false, false, 0.0, 0.0);
+        self.looks += self.length.len() as u64;
         for i in 0..self.length.len() {
             moved |= self.follow(i, stretch);
             // As the hair lies now, not as it came: pushed segments are longer or shorter.
