@@ -1,5 +1,6 @@
 //! The generalized cylinder of a cluster, as plain data.
 
+use super::Region;
 use super::curve::{Curve, check_stations};
 use super::skeleton::turned;
 use nalgebra::{Rotation3, Similarity3, UnitQuaternion};
@@ -56,6 +57,15 @@ impl Cylinder {
         }
     }
 
+    /// A cylinder along `control` whose section at the root is a region of scalp space laid on the skin. `root` is the
+    /// skin's frame at the region's centre, where a unit of u and one of v are `unit` long, scene units: a root there is
+    /// where V(r, theta, 0) is for its r and angle in the region, if the skin is flat and the skeleton stands upright.
+    pub fn over(region: &Region, control: Vec<Vec3>, root: &Frame, unit: [f64; 2]) -> Self {
+        let mean = (unit[0] * unit[1]).sqrt();
+        let radius = region.radius.iter().map(|r| r * mean).collect();
+        Cylinder { scale: unit.map(|u| Curve::constant(u / mean)), ..Cylinder::new(control, root, radius) }
+    }
+
     /// It after a rigid motion, or a motion that scales.
     pub fn moved(&self, by: &Similarity3<f64>) -> Self {
         let mut out = self.clone();
@@ -92,5 +102,25 @@ impl Cylinder {
             }
         }
         self.twist.check("the twist")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Shape;
+    use super::*;
+
+    #[test]
+    fn a_cylinder_over_a_region_stands_on_it() {
+        let region = Region { centre: [0.4, 0.6], radius: vec![0.1, 0.2, 0.15, 0.1, 0.12] };
+        let root = Frame { origin: Vec3::new(1.0, 2.0, 3.0), n: Vec3::y(), du: Vec3::z(), dv: Vec3::x() };
+        let c = Cylinder::over(&region, vec![root.origin, root.origin + root.n * 2.0], &root, [3.0, 5.0]);
+        let shape = Shape::new(&c).expect("a shape");
+        for k in 0..30 {
+            let uv = [0.4 + 0.01 * f64::from(k % 6) - 0.02, 0.6 + 0.01 * f64::from(k % 5)];
+            let wanted = root.origin + root.du * (3.0 * (uv[0] - 0.4)) + root.dv * (5.0 * (uv[1] - 0.6));
+            let [r, angle] = region.polar(uv);
+            assert!((shape.point(r, angle, 0.0) - wanted).norm() < 1e-12);
+        }
     }
 }

@@ -1,9 +1,8 @@
 //! Hairs that follow clusters from their own roots.
 
-use super::{Owners, Section, Shape, Tree};
+use super::{Owners, Region, Section, Shape, Tree};
 use pelage_geom::{NONE, Vec3, curve};
 use rayon::prelude::*;
-use std::f64::consts::TAU;
 
 /// Sections between two points of a hair, from which hairs that are cut are cut. With 1 a cut hair would miss what the
 /// hair does between its points; more than 4 only cost time.
@@ -48,27 +47,9 @@ pub fn attach(tree: &Tree, owners: &Owners, uv: &[[f64; 2]], root: &[Vec3]) -> R
     Ok(uv.iter().zip(root).enumerate().map(of).collect())
 }
 
-/// `n` places (r, theta) spread evenly over a contour, that at the root: the first ones of more are the same. The
-/// sequence of Roberts (2018, "The unreasonable effectiveness of quasirandom sequences"): multiples of 1/g and 1/g^2,
-/// with g^3 = g + 1.
+/// `n` places (r, theta) spread evenly over the contour at the root ([`Region::fill`]).
 pub fn fill(shape: &Shape, n: usize) -> Vec<[f64; 2]> {
-    const STEPS: usize = 256;
-    const STEP: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_2];
-    let section = shape.section(0.0);
-    // Share of the area up to an angle.
-    let mut share = vec![0.0];
-    for k in 0..STEPS {
-        let r = section.radius((k as f64 + 0.5) * TAU / STEPS as f64);
-        share.push(share[k] + r * r);
-    }
-    let place = |k: usize| {
-        let [u, v] = STEP.map(|s| 0.5 + s * k as f64).map(|x| x - x.floor());
-        let wanted = v * share[STEPS];
-        let i = share[1..STEPS].partition_point(|s| *s <= wanted);
-        let theta = (i as f64 + (wanted - share[i]) / (share[i + 1] - share[i])) * TAU / STEPS as f64;
-        [u.sqrt(), theta]
-    };
-    (0..n).map(place).collect()
+    Region { centre: [0.0; 2], radius: shape.section(0.0).ring }.fill(n)
 }
 
 /// The skeleton of a cluster at `points` equal steps of arc length: the line that a clump gathers about, scene units.
@@ -177,6 +158,7 @@ mod tests {
     use super::super::{Cluster, split};
     use super::*;
     use pelage_geom::rng::uniform;
+    use std::f64::consts::TAU;
 
     fn way(hair: &[Vec3]) -> f64 {
         hair.windows(2).map(|w| (w[1] - w[0]).norm()).sum()
@@ -209,11 +191,12 @@ mod tests {
             let lengths: Vec<Length> =
                 (0..hairs.len()).map(|k| if k % 2 == 0 { Length::Cut(1.3) } else { Length::Scaled(7.0) }).collect();
             let cut = grow(&tree, &hairs, &lengths, 11, 0.5).expect("hairs");
-            for (k, (hair, whole)) in cut.chunks(11).zip(got.chunks(11)).enumerate() {
+            let fine = grow(&tree, &hairs, &[Length::Natural], 41, 0.5).expect("hairs");
+            for (k, (hair, whole)) in cut.chunks(11).zip(fine.chunks(41)).enumerate() {
                 let wanted = if k % 2 == 0 { 1.3 } else { 7.0 };
                 assert!((way(hair) / wanted - 1.0).abs() < 1e-9 && hair[0] == whole[0]);
                 if k % 2 == 0 {
-                    assert!(hair.iter().all(|p| curve::closest_on_polyline(whole, *p).3 < 0.05));
+                    assert!(hair.iter().all(|p| curve::closest_on_polyline(whole, *p).3 < 0.01));
                 }
             }
             let long = grow(&tree, &hairs, &[Length::Cut(100.0)], 11, 0.5).expect("hairs");

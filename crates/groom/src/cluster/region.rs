@@ -80,6 +80,33 @@ impl Region {
         self.polar(at)[0] <= 1.0
     }
 
+    /// `n` places (r, angle) spread evenly over it: the first ones of more are the same. The sequence of Roberts (2018,
+    /// "The unreasonable effectiveness of quasirandom sequences"): multiples of 1/g and 1/g^2, with g^3 = g + 1.
+    pub fn fill(&self, n: usize) -> Vec<[f64; 2]> {
+        const STEPS: usize = 256;
+        const STEP: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_2];
+        // Share of the area up to an angle.
+        let mut share = vec![0.0];
+        for k in 0..STEPS {
+            let r = self.radius((k as f64 + 0.5) * TAU / STEPS as f64);
+            share.push(share[k] + r * r);
+        }
+        let place = |k: usize| {
+            let [u, v] = STEP.map(|s| 0.5 + s * k as f64).map(|x| x - x.floor());
+            let wanted = v * share[STEPS];
+            let i = share[1..STEPS].partition_point(|s| *s <= wanted);
+            let angle = (i as f64 + (wanted - share[i]) / (share[i + 1] - share[i])) * TAU / STEPS as f64;
+            [u.sqrt(), angle]
+        };
+        (0..n).map(place).collect()
+    }
+
+    /// Its area.
+    pub fn area(&self) -> f64 {
+        let turn = TAU / 256.0;
+        (0..256).map(|k| self.radius(turn * f64::from(k))).map(|r| 0.5 * r * r * turn).sum()
+    }
+
     /// Those of `uv` that it contains, in order.
     pub fn roots(&self, uv: &[[f64; 2]]) -> Vec<u32> {
         (0..uv.len() as u32).filter(|k| self.contains(uv[*k as usize])).collect()
@@ -149,9 +176,9 @@ mod tests {
         assert!(wrong <= 4, "{wrong}");
         assert!((region.centre[0] - 4.0).abs() < 0.3 && found.len() > 500);
         for k in 0..50 {
-            let p = [0.03 * f64::from(k), 0.3 * f64::from(k) - 3.0];
+            let p = [0.03 * f64::from(k + 1), 0.1 * f64::from(k) - 2.5];
             let q = region.polar(region.at(p));
-            assert!((p[0] - q[0]).abs() < 1e-12 && (region.distance_squared(region.at(p)).sqrt() >= p[0]));
+            assert!((p[0] - q[0]).abs() < 1e-12 && (p[1] - q[1]).abs() < 1e-9);
         }
         assert!(
             Region::circle([1.0, 2.0], 0.5).contains([1.3, 2.3])

@@ -1,7 +1,7 @@
 //! Evaluating a generalized cylinder: points, derivatives, sections, and back from points.
 
 use super::curve::{around, through};
-use super::{Cylinder, Skeleton};
+use super::{Cylinder, Region, Skeleton};
 use pelage_geom::Vec3;
 
 /// A cylinder made ready for evaluation.
@@ -69,9 +69,7 @@ impl Section {
 
     /// Area inside the contour, scene units squared: S_N S_B times the integral of R^2 / 2, by 256 angles.
     pub fn area(&self) -> f64 {
-        let turn = std::f64::consts::TAU / 256.0;
-        let sum: f64 = (0..256).map(|k| self.radius(turn * f64::from(k))).map(|r| 0.5 * r * r * turn).sum();
-        sum * self.scale[0] * self.scale[1]
+        Region { centre: [0.0; 2], radius: self.ring.clone() }.area() * self.scale[0] * self.scale[1]
     }
 }
 

@@ -3,7 +3,7 @@
 use super::region::seen;
 use super::{Cluster, Contour, Curve, Cylinder, Region, Shape, Tree};
 use pelage_geom::{NONE, Vec3};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 /// Angles of a child's contour. With 12, corners between neighbours are cut off by a twentieth of a child's width; more
 /// than 24 only take room.
@@ -56,13 +56,9 @@ fn cells(region: &Region, n: usize) -> Vec<Region> {
     if n == 1 {
         return vec![region.clone()];
     }
-    let golden = PI * (3.0 - 5f64.sqrt());
-    let spread = |k: usize, of: usize| region.at([((k as f64 + 0.5) / of as f64).sqrt(), golden * k as f64]);
     // A grid over the region, so that points stand for equal areas whatever its form.
     let reach = region.radius.iter().copied().fold(0.0, f64::max);
-    let turn = TAU / 256.0;
-    let area: f64 = (0..256).map(|k| region.radius(turn * f64::from(k))).map(|r| 0.5 * r * r * turn).sum();
-    let step = (area / (n * SAMPLES) as f64).sqrt();
+    let step = (region.area() / (n * SAMPLES) as f64).sqrt();
     let lines = (reach / step).ceil() as i64;
     let place = |i: i64| (i as f64 + 0.5) * step;
     let grid: Vec<[f64; 2]> = (-lines..lines)
@@ -70,7 +66,7 @@ fn cells(region: &Region, n: usize) -> Vec<Region> {
         .map(|(i, j)| [region.centre[0] + place(i), region.centre[1] + place(j)])
         .filter(|p| region.contains(*p))
         .collect();
-    let mut centre: Vec<[f64; 2]> = (0..n).map(|k| spread(k, n)).collect();
+    let mut centre: Vec<[f64; 2]> = region.fill(n).into_iter().map(|p| region.at(p)).collect();
     for _ in 0..ROUNDS {
         let mut sum = vec![[0.0; 3]; n];
         for p in &grid {
@@ -189,7 +185,7 @@ mod tests {
     use super::super::test_clusters::{samples, upright};
     use super::super::{Length, Owners, Rooted, attach, grow};
     use super::*;
-    use pelage_geom::rng::uniform;
+    use pelage_geom::{curve, rng::uniform};
 
     fn bean() -> Region {
         let radius = |k: usize| 1.0 + 0.35 * libm::cos(2.0 * TAU * k as f64 / 36.0);
@@ -207,7 +203,7 @@ mod tests {
     fn children_share_their_parents_region_evenly() {
         for (region, n) in [(Region::circle([0.5, 0.5], 1.0), 7), (bean(), 12), (bean(), 60), (bean(), 2)] {
             let cells = cells(&region, n);
-            let at = within(&region, 20_000);
+            let at = within(&region, 100_000);
             let mut owned = vec![0.0; n];
             let (mut nobody, mut several) = (0.0, 0.0);
             for p in &at {
@@ -222,18 +218,25 @@ mod tests {
                 owned[owner] += 1.0;
             }
             let all = at.len() as f64;
-            assert!(nobody < 0.03 * all && several < 0.03 * all, "{n}: {nobody} {several} of {all}");
-            let even = all / n as f64;
+            assert!(nobody < 0.02 * all && several < 0.02 * all, "{n}: {nobody} {several} of {all}");
+            let even = owned.iter().sum::<f64>() / n as f64;
+            println!("EVEN {n} {:?}", owned.iter().fold((1f64, 1f64), |m, o| (m.0.min(o / even), m.1.max(o / even))));
             assert!(owned.iter().all(|o| (o / even - 1.0).abs() < 0.25), "{n}: {owned:?} of {even}");
             assert!(cells == super::cells(&region, n));
         }
     }
 
-    /// Tips and all of hairs that follow clusters of `tree` from its roots, in the order of `uv`.
+    const POINTS: usize = 33;
+
+    /// How far the median hair may move, in largest girths of the parent. The third is an ellipse whose hairs go around
+    /// it with the twist: its parts are sheared, which contours can't follow.
+    const LIMIT: [f64; 5] = [1e-12, 0.005, 0.06, 0.03, 0.006];
+
+    /// Hairs that follow clusters of `tree` from its roots, in the order of `uv`.
     fn hairs(tree: &Tree, uv: &[[f64; 2]], root: &[Vec3]) -> Vec<Vec3> {
         let owners = Owners::find(tree, uv);
         let hairs: Vec<Rooted> = attach(tree, &owners, uv, root).expect("attached");
-        grow(tree, &hairs, &[Length::Natural], 9, 1.0).expect("hairs")
+        grow(tree, &hairs, &[Length::Natural], POINTS, 1.0).expect("hairs")
     }
 
     #[test]
@@ -252,17 +255,19 @@ mod tests {
             let children = split(&mut tree, 0, 5, 24).expect("children");
             let after = hairs(&tree, &uv, &root);
             let off = |a: &[Vec3], b: &[Vec3]| {
-                let mut off: Vec<f64> = a.iter().zip(b).map(|(p, q)| (p - q).norm() / size).collect();
+                let pairs = a.chunks(POINTS).zip(b.chunks(POINTS));
+                let mut off: Vec<f64> =
+                    pairs.flat_map(|(a, b)| b.iter().map(|p| curve::closest_on_polyline(a, *p).3 / size)).collect();
                 off.sort_by(f64::total_cmp);
                 (off[off.len() / 2], off[off.len() * 19 / 20])
             };
             let (median, most) = off(&before, &after);
-            assert!(median < 0.06 && most < 0.25, "{k}: {median} {most}");
+            assert!(median < LIMIT[k] && most < 4.0 * LIMIT[k], "{k}: {median} {most}");
             for c in children {
                 split(&mut tree, c, 4, 24).expect("children");
             }
             let (median, most) = off(&before, &hairs(&tree, &uv, &root));
-            assert!(median < 0.09 && most < 0.3, "{k}: {median} {most}");
+            assert!(median < 2.0 * LIMIT[k] && most < 8.0 * LIMIT[k], "{k} twice: {median} {most}");
         }
     }
 
