@@ -2,9 +2,9 @@
 
 use std::f64::consts::TAU;
 
-/// A smooth curve through values at stations: cubic pieces with one slope where they meet. Between two stations it stays
-/// between their values, so that a scale that tapers to 0 does not go below it. Before the first station and after
-/// the last it is constant.
+/// A smooth curve through values at stations: cubic pieces with one slope where they meet. Between two stations it
+/// stays between their values, so that a scale that tapers to 0 does not go below it. Before the first station and
+/// after the last it is constant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
     /// \[S\] where, from 0 at the root to 1 at the tip, each beyond the one before; at least one.

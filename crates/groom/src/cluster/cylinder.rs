@@ -32,8 +32,8 @@ pub struct Cylinder {
     pub control: Vec<Vec3>,
     /// Axis of the root: the skin's normal, or the parent's tangent. Unit.
     pub axis: Vec3,
-    /// Side of the root, at right angles to `axis`: the skin's tangent along u, or the parent's N. The smallest rotation
-    /// of `axis` into the skeleton's first tangent makes it N(0).
+    /// Side of the root, at right angles to `axis`: the skin's tangent along u, or the parent's N. The smallest
+    /// rotation of `axis` into the skeleton's first tangent makes it N(0).
     pub side: Vec3,
     /// R.
     pub contour: Contour,
@@ -58,8 +58,9 @@ impl Cylinder {
     }
 
     /// A cylinder along `control` whose section at the root is a region of scalp space laid on the skin. `root` is the
-    /// skin's frame at the region's centre, where a unit of u and one of v are `unit` long, scene units: a root there is
-    /// where V(r, theta, 0) is for its r and angle in the region, if the skin is flat and the skeleton stands upright.
+    /// skin's frame at the region's centre, where a unit of u and one of v are `unit` long, scene units: a root there
+    /// is where V(r, theta, 0) is for its r and angle in the region, if the skin is flat and the skeleton stands
+    /// upright.
     pub fn over(region: &Region, control: Vec<Vec3>, root: &Frame, unit: [f64; 2]) -> Self {
         let mean = (unit[0] * unit[1]).sqrt();
         let radius = region.radius.iter().map(|r| r * mean).collect();

@@ -58,8 +58,8 @@ pub fn line(shape: &Shape, points: usize) -> Vec<Vec3> {
     (0..points).map(|k| shape.skeleton().place(k as f64 / last as f64).at).collect()
 }
 
-/// \[H * P\] points of hairs, scene units, root first: V(r, theta, t) at P equal steps of t. Where V does not begin in a
-/// hair's own root, the way there is added to the hair, less and less up to t = `blend` (above 0, up to 1; small, and
+/// \[H * P\] points of hairs, scene units, root first: V(r, theta, t) at P equal steps of t. Where V does not begin in
+/// a hair's own root, the way there is added to the hair, less and less up to t = `blend` (above 0, up to 1; small, and
 /// hairs bend where they meet the skin). `length` is one for all or one a hair; cut hairs have equal segments.
 pub fn grow(tree: &Tree, hairs: &[Rooted], length: &[Length], points: usize, blend: f64) -> Result<Vec<Vec3>, String> {
     if points < 2 || !(blend > 0.0 && blend <= 1.0) {

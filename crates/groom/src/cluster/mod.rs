@@ -4,8 +4,8 @@
 //! cluster is a [`Cylinder`]: a skeleton with contours, scales and a twist along it. Where it stands on the skin is a
 //! [`Region`] of scalp space, a plane that the roots have coordinates in: texture coordinates, or what else the caller
 //! likes; where these stretch, clusters stretch with them. [`split`] fills a cluster with children, [`bind`] and
-//! [`update`] carry them through edits of their parent, [`copy`] and [`paste`] bring a style from one cluster to another,
-//! [`Owners`] says which clusters a root belongs to, and [`grow`] lets its hair follow the last of them.
+//! [`update`] carry them through edits of their parent, [`copy`] and [`paste`] bring a style from one cluster to
+//! another, [`Owners`] says which clusters a root belongs to, and [`grow`] lets its hair follow the last of them.
 //!
 //! Coordinates in a cluster: `t` from 0 at the root to 1 at the tip by the arc length of the skeleton; `theta` in the
 //! section, in radians; `r` from 0 on the skeleton to 1 on the contour, and beyond outside.

@@ -15,10 +15,10 @@ pub struct Owners {
 }
 
 impl Owners {
-    /// Finds the owners of roots (`uv`, in scalp space). The paper's FINDOWNER: from the top, at each level the child of
-    /// the owner that contains the root, of several the one with the nearest centre. Where no child does and the owner
-    /// is no leaf, the leaf below it with the nearest centre. Distances of one level are not compared with those of
-    /// another; of equal ones the first counts.
+    /// Finds the owners of roots (`uv`, in scalp space). The paper's FINDOWNER: from the top, at each level the child
+    /// of the owner that contains the root, of several the one with the nearest centre. Where no child does and the
+    /// owner is no leaf, the leaf below it with the nearest centre. Distances of one level are not compared with those
+    /// of another; of equal ones the first counts.
     pub fn find(tree: &Tree, uv: &[[f64; 2]]) -> Self {
         let levels = tree.levels().iter().max().map_or(0, |l| l + 1);
         let n = tree.cluster.len() as u32;

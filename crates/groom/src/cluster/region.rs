@@ -8,8 +8,8 @@ use std::f64::consts::TAU;
 pub struct Region {
     /// Its centre: a cluster's root.
     pub centre: [f64; 2],
-    /// \[K\] radii at equal angles from u towards v, above 0, in units of scalp space; one is a circle. Between them the
-    /// curve is smooth.
+    /// \[K\] radii at equal angles from u towards v, above 0, in units of scalp space; one is a circle. Between them
+    /// the curve is smooth.
     pub radius: Vec<f64>,
 }
 

@@ -41,8 +41,8 @@ impl Section {
         self.centre + (n * (cos * self.scale[0]) + b * (sin * self.scale[1])) * (r * self.radius(theta))
     }
 
-    /// Coordinates (r, theta) of the point of the section's plane that lies under `p`: its inverse where both scales are
-    /// above 0.
+    /// Coordinates (r, theta) of the point of the section's plane that lies under `p`: its inverse where both scales
+    /// are above 0.
     pub fn coordinates(&self, p: Vec3) -> [f64; 2] {
         let d = p - self.centre;
         let (x, y) = (d.dot(&self.axes[1]) / self.scale[0], d.dot(&self.axes[2]) / self.scale[1]);

@@ -3,8 +3,8 @@
 use pelage_geom::Vec3;
 
 /// Parts that a piece of the spline is cut in, for its table of arc lengths and frames. Frames are off by the fourth
-/// power of a part's turn: with 4 parts, a piece that turns by a right angle has frames off by 2e-4; with 8 by 1e-5. More
-/// parts only cost time.
+/// power of a part's turn: with 4 parts, a piece that turns by a right angle has frames off by 2e-4; with 8 by 1e-5.
+/// More parts only cost time.
 const PARTS: usize = 8;
 
 /// A Catmull-Rom spline through control points, by arc length, with rotation-minimising frames.
@@ -188,8 +188,8 @@ const GAUSS: [(f64, f64); 2] =
     [(0.538_469_310_105_683_1, 0.478_628_670_499_366_47), (0.906_179_845_938_664, 0.236_926_885_056_189_08)];
 
 impl Node {
-    /// Its normal carried to a next point with tangent `to`: two reflections, one that exchanges the points and one that
-    /// brings the tangent home (Wang, Juettler, Zheng, Liu 2008, "Computation of rotation minimizing frames").
+    /// Its normal carried to a next point with tangent `to`: two reflections, one that exchanges the points and one
+    /// that brings the tangent home (Wang, Juettler, Zheng, Liu 2008, "Computation of rotation minimizing frames").
     fn carried(&self, at: Vec3, to: Vec3) -> Vec3 {
         let reflect = |v: Vec3, along: Vec3| {
             let square = along.norm_squared();
@@ -204,8 +204,8 @@ impl Node {
     }
 }
 
-/// `v`, at right angles to the unit vector `from`, after the smallest rotation of `from` into the unit vector `to`. Where
-/// `to` is opposite, half a turn about `v`.
+/// `v`, at right angles to the unit vector `from`, after the smallest rotation of `from` into the unit vector `to`.
+/// Where `to` is opposite, half a turn about `v`.
 pub(super) fn turned(v: Vec3, from: Vec3, to: Vec3) -> Vec3 {
     let whole = 1.0 + from.dot(&to);
     if whole < 1e-9 {

@@ -44,9 +44,9 @@ pub fn copy(tree: &Tree, cluster: u32) -> Result<Style, String> {
     Ok(Style { bound: bind(&tree, 0)?, tree })
 }
 
-/// Pastes a style onto a cluster at any level: what was split from it before goes, and copies of what is below the copied
-/// cluster come, last in the tree. Their regions lie in its region as they lay in theirs. A tree that can't be pasted to
-/// stays as it is.
+/// Pastes a style onto a cluster at any level: what was split from it before goes, and copies of what is below the
+/// copied cluster come, last in the tree. Their regions lie in its region as they lay in theirs. A tree that can't be
+/// pasted to stays as it is.
 pub fn paste(tree: &mut Tree, style: &Style, target: u32, how: Paste) -> Result<(), String> {
     let mut out = tree.clone();
     let Some((from, below)) = style.tree.cluster.split_first() else { return Err("an empty style".into()) };
