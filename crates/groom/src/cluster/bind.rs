@@ -70,8 +70,8 @@ pub struct Bound {
     pub root: [[f64; 3]; 2],
     /// Its scales as they were.
     pub scale: [Curve; 2],
-    /// Girth of the parent at each station of these, scene units.
-    pub girth: [Vec<f64>; 2],
+    /// Section of the parent at each station of these, and its girth there, scene units.
+    pub girth: [Vec<[f64; 2]>; 2],
 }
 
 impl Bound {
@@ -84,7 +84,8 @@ impl Bound {
         let point: Vec<Coordinates> =
             child.control.iter().zip(&t).map(|(p, t)| coordinates(parent, *p, first + way * t)).collect();
         let axes = parent.section(point[0].t).turned_axes();
-        let girth = |c: &Curve| c.t.iter().map(|s| parent.section(section_of(&point, &t, *s)).girth()).collect();
+        let at = |s: &f64| section_of(&point, &t, *s);
+        let girth = |c: &Curve| c.t.iter().map(at).map(|t| [t, parent.section(t).girth()]).collect();
         Ok(Bound {
             cluster,
             root: [child.axis, child.side].map(|v| axes.map(|a| a.dot(&v))),
@@ -96,21 +97,19 @@ impl Bound {
 
     /// `child`, which was bound to a parent, where the parent is now. Where the parent has become wider or narrower,
     /// its scales follow.
-    pub fn updated(&self, child: &Cylinder, parent: &Shape) -> Result<Cylinder, String> {
+    pub fn updated(&self, child: &Cylinder, parent: &Shape) -> Cylinder {
         let mut out = child.clone();
         out.control = self.point.iter().map(|c| position(parent, c)).collect();
         let axes = parent.section(self.point[0].t).turned_axes();
         [out.axis, out.side] = self.root.map(|v| sum(axes, v));
-        // Its stations go with the control points as they were bound; without scales they are not needed.
-        let t = Shape::new(child)?.skeleton().control_t();
         for ((to, from), girth) in out.scale.iter_mut().zip(&self.scale).zip(&self.girth) {
             *to = from.clone();
-            for ((v, s), before) in to.value.iter_mut().zip(&from.t).zip(girth) {
-                let now = parent.section(section_of(&self.point, &t, *s)).girth();
+            for (v, [t, before]) in to.value.iter_mut().zip(girth) {
+                let now = parent.section(*t).girth();
                 *v *= if *before > 0.0 { now / before } else { 1.0 };
             }
         }
-        Ok(out)
+        out
     }
 }
 
@@ -140,7 +139,7 @@ pub fn update(tree: &mut Tree, bound: &[Bound]) -> Result<(), String> {
         if c.parent == NONE || b.point.len() != c.cylinder.control.len() {
             return Err(format!("cluster {} is not what was bound", b.cluster));
         }
-        let next = b.updated(&c.cylinder, &out.shape(c.parent)?).map_err(|e| format!("cluster {}: {e}", b.cluster))?;
+        let next = b.updated(&c.cylinder, &out.shape(c.parent)?);
         Shape::new(&next).map_err(|e| format!("cluster {} after the edit: {e}", b.cluster))?;
         out.cluster[b.cluster as usize].cylinder = next;
     }
@@ -219,6 +218,17 @@ mod tests {
             wanted.cluster.iter_mut().for_each(|c| c.cylinder = c.cylinder.moved(&by));
             assert!(far(&moved, &wanted) < 1e-9 * size, "{}", far(&moved, &wanted));
             assert!(far(&moved, &tree) > size);
+
+            // After any edit and back, all is as it was.
+            let mut edited = tree.clone();
+            edited.cluster[0].cylinder.twist.value[0] += 2.0;
+            edited.cluster[0].cylinder.control[1] += Vec3::new(1.0, 0.5, 0.2) * size;
+            edited.cluster[0].cylinder.scale[0].value[0] *= 2.0;
+            update(&mut edited, &bound).expect("updated");
+            assert!(far(&edited, &tree) > 0.1 * size);
+            edited.cluster[0].cylinder = parent;
+            update(&mut edited, &bound).expect("updated");
+            assert!(far(&edited, &tree) < 1e-9 * size);
         }
     }
 
