@@ -70,7 +70,8 @@ pub struct Bound {
     pub root: [[f64; 3]; 2],
     /// Its scales as they were.
     pub scale: [Curve; 2],
-    /// Section of the parent at each station of these, and its girth there, scene units.
+    /// Section of the parent at each station of these, and its girth there, scene units: 0 where it is flat, and the
+    /// scale stays.
     pub girth: [Vec<[f64; 2]>; 2],
 }
 
@@ -85,7 +86,8 @@ impl Bound {
             child.control.iter().zip(&t).map(|(p, t)| coordinates(parent, *p, first + way * t)).collect();
         let axes = parent.section(point[0].t).turned_axes();
         let at = |s: &f64| section_of(&point, &t, *s);
-        let girth = |c: &Curve| c.t.iter().map(at).map(|t| [t, parent.section(t).girth()]).collect();
+        let wide = |girth: f64| if girth > FLAT * parent.widest() { girth } else { 0.0 };
+        let girth = |c: &Curve| c.t.iter().map(at).map(|t| [t, wide(parent.section(t).girth())]).collect();
         Ok(Bound {
             cluster,
             root: [child.axis, child.side].map(|v| axes.map(|a| a.dot(&v))),
