@@ -19,14 +19,18 @@ impl Curve {
         Curve { t: vec![0.0], value: vec![value] }
     }
 
-    /// Value at `t`.
+    /// Value at `t`; 0 without stations.
     pub fn at(&self, t: f64) -> f64 {
-        through(&self.t, |k| self.value[k], t).0
+        self.both(t).0
     }
 
     /// Derivative by `t` there; 0 beyond the ends.
     pub fn slope(&self, t: f64) -> f64 {
-        through(&self.t, |k| self.value[k], t).1
+        self.both(t).1
+    }
+
+    fn both(&self, t: f64) -> (f64, f64) {
+        through(&self.t, |k| self.value.get(k).copied().unwrap_or(0.0), t)
     }
 
     /// Sum of the ways up and down.
@@ -66,7 +70,7 @@ pub(super) fn check_stations(t: &[f64], name: &str) -> Result<(), String> {
 /// Slopes at inner stations are weighted harmonic means of those of the two chords, zero where these differ in sign
 /// (Fritsch, Butland 1984); at the ends the slope of the only chord.
 pub(super) fn through(t: &[f64], value: impl Fn(usize) -> f64, at: f64) -> (f64, f64) {
-    let last = t.len() - 1;
+    let Some(last) = t.len().checked_sub(1) else { return (0.0, 0.0) };
     if at <= t[0] || last == 0 {
         return (value(0), 0.0);
     }
@@ -94,8 +98,9 @@ pub(super) fn through(t: &[f64], value: impl Fn(usize) -> f64, at: f64) -> (f64,
 /// angle `theta`; `change` are the derivatives of `ring` by time (none: zero). Slopes as in [`through`].
 pub(super) fn around(ring: &[f64], change: &[f64], theta: f64) -> [f64; 3] {
     let n = ring.len();
-    if n == 1 {
-        return [ring[0], 0.0, change.first().copied().unwrap_or(0.0)];
+    if n < 2 {
+        let only = |of: &[f64]| of.first().copied().unwrap_or(0.0);
+        return [only(ring), 0.0, only(change)];
     }
     let turn = theta / TAU;
     let place = (turn - turn.floor()) * n as f64;

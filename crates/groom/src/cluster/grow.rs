@@ -52,6 +52,27 @@ pub fn fill(shape: &Shape, n: usize) -> Vec<[f64; 2]> {
     Region { centre: [0.0; 2], radius: shape.section(0.0).ring }.fill(n)
 }
 
+/// Hairs that fill the leaves of a tree evenly, `density` hairs per unit of area across the roots of clusters (scene
+/// units squared), to the next whole number in each. Where clusters overlap they add up: sample the skin and find
+/// [`Owners`] where that shows.
+pub fn fill_leaves(tree: &Tree, density: f64) -> Result<Vec<Rooted>, String> {
+    if !(0.0..).contains(&density) {
+        return Err(format!("a density of hairs can't be {density}"));
+    }
+    let mut out = Vec::new();
+    for k in (0..).zip(tree.leaves()).filter(|(_, leaf)| *leaf).map(|(k, _)| k) {
+        let shape = tree.shape(k)?;
+        let section = shape.section(0.0);
+        let hairs = (section.area() * density).round();
+        if !(0.0..=f64::from(NONE)).contains(&hairs) {
+            return Err(format!("a density of {density} gives cluster {k} too many hairs"));
+        }
+        let rooted = |at: [f64; 2]| Rooted { root: section.point(at[0], at[1]), cluster: k, at };
+        out.extend(fill(&shape, hairs as usize).into_iter().map(rooted));
+    }
+    Ok(out)
+}
+
 /// The skeleton of a cluster at `points` equal steps of arc length: the line that a clump gathers about, scene units.
 pub fn line(shape: &Shape, points: usize) -> Vec<Vec3> {
     let last = points.max(2) - 1;
@@ -236,6 +257,27 @@ mod tests {
             let close = points.iter().enumerate().flat_map(|(k, p)| points[..k].iter().map(move |q| (p - q).norm()));
             assert!(close.fold(f64::INFINITY, f64::min) > 0.1 * spacing);
         }
+    }
+
+    #[test]
+    fn leaves_are_filled_by_their_areas() {
+        let mut tree = Tree {
+            cluster: samples().into_iter().map(|cylinder| Cluster { cylinder, ..upright([0.0; 2], 1.0) }).collect(),
+        };
+        let area: Vec<f64> = tree.shapes().expect("shapes").iter().map(|s| s.section(0.0).area()).collect();
+        let children = split(&mut tree, 0, 6, 4).expect("children");
+        let hairs = fill_leaves(&tree, 3000.0).expect("hairs");
+        let of = |clusters: &[u32]| hairs.iter().filter(|h| clusters.contains(&h.cluster)).count() as f64;
+        assert!((of(&children) / (3000.0 * area[0]) - 1.0).abs() < 0.03 && of(&[0]) == 0.0);
+        assert!((1..5).all(|k| (of(&[k]) - 3000.0 * area[k as usize]).abs() <= 0.5));
+        let grown = grow(&tree, &hairs, &[Length::Natural], 3, 1.0).expect("hairs");
+        for (hair, line) in hairs.iter().zip(grown.chunks(3)) {
+            let shape = tree.shape(hair.cluster).map(|s| s.point(hair.at[0], hair.at[1], 0.5)).expect("a point");
+            assert!(line[0] == hair.root && (line[1] - shape).norm() < 1e-12);
+        }
+        assert!(fill_leaves(&tree, -1.0).unwrap_err().contains("can't be -1"));
+        assert!(fill_leaves(&tree, 1e12).unwrap_err().contains("too many"));
+        assert!(fill_leaves(&tree, f64::NAN).is_err());
     }
 
     #[test]

@@ -27,7 +27,7 @@ mod tree;
 pub use bind::{Bound, Coordinates, bind, coordinates, position, update};
 pub use curve::Curve;
 pub use cylinder::{Contour, Cylinder};
-pub use grow::{Length, Rooted, attach, fill, grow, line};
+pub use grow::{Length, Rooted, attach, fill, fill_leaves, grow, line};
 pub use owner::Owners;
 pub use region::Region;
 pub use shape::{Section, Shape};

@@ -14,7 +14,8 @@ pub struct Cluster {
     pub cylinder: Cylinder,
 }
 
-/// Clusters, parents before their children.
+/// Clusters, parents before their children. What comes from a file is checked first ([`Tree::check`]); the other
+/// functions do not fail on an unsound tree, but may miss clusters.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tree {
     /// \[N\] the clusters.
@@ -59,7 +60,7 @@ impl Tree {
         let mut is = vec![false; self.cluster.len()];
         let mut out = Vec::new();
         for (k, c) in self.cluster.iter().enumerate() {
-            if c.parent != NONE && (c.parent == cluster || is[c.parent as usize]) {
+            if c.parent != NONE && (c.parent == cluster || is.get(c.parent as usize).is_some_and(|is| *is)) {
                 is[k] = true;
                 out.push(k as u32);
             }
@@ -70,7 +71,11 @@ impl Tree {
     /// \[N\] true for clusters without children.
     pub fn leaves(&self) -> Vec<bool> {
         let mut leaf = vec![true; self.cluster.len()];
-        self.cluster.iter().filter(|c| c.parent != NONE).for_each(|c| leaf[c.parent as usize] = false);
+        for c in &self.cluster {
+            if let Some(leaf) = leaf.get_mut(c.parent as usize) {
+                *leaf = false;
+            }
+        }
         leaf
     }
 
@@ -78,7 +83,7 @@ impl Tree {
     pub fn levels(&self) -> Vec<usize> {
         let mut level: Vec<usize> = Vec::with_capacity(self.cluster.len());
         for c in &self.cluster {
-            level.push(if c.parent == NONE { 0 } else { level[c.parent as usize] + 1 });
+            level.push(level.get(c.parent as usize).map_or(0, |l| l + 1));
         }
         level
     }
@@ -98,7 +103,8 @@ impl Tree {
             k += 1;
             number[k - 1] != NONE
         });
-        self.cluster.iter_mut().filter(|c| c.parent != NONE).for_each(|c| c.parent = number[c.parent as usize]);
+        let now = |parent: u32| number.get(parent as usize).copied().unwrap_or(NONE);
+        self.cluster.iter_mut().for_each(|c| c.parent = now(c.parent));
     }
 }
 
@@ -129,6 +135,11 @@ mod tests {
     #[test]
     fn what_is_wrong_is_said() {
         assert!(tree(&[NONE, 1]).check().unwrap_err().contains("cluster 1 comes before its parent"));
+        let mut t = tree(&[7, 1, 9]);
+        assert!(t.check().is_err());
+        assert_eq!((t.levels(), t.below(1), t.leaves()), (vec![0; 3], vec![1], vec![true, false, true]));
+        t.prune(1);
+        assert_eq!(t.cluster.len(), 2);
         let mut t = tree(&[NONE, 0]);
         t.cluster[1].cylinder = plain(vec![Vec3::zeros()], 1.0);
         assert!(t.check().unwrap_err().starts_with("cluster 1: a skeleton"));
