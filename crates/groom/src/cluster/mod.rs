@@ -31,7 +31,7 @@ pub use grow::{Length, Rooted, attach, fill, fill_leaves, grow, line};
 pub use owner::Owners;
 pub use region::Region;
 pub use shape::{Section, Shape};
-pub use skeleton::Skeleton;
+pub use skeleton::{Place, Skeleton};
 pub use split::split;
 pub use style::{Paste, Style, copy, paste};
 pub use tree::{Cluster, Tree};
