@@ -2,9 +2,8 @@
 
 use pelage_geom::Vec3;
 
-/// Parts that a piece of the spline is cut in, for its table of arc lengths and frames. Frames are off by the fourth
-/// power of a part's turn: with 4 parts, a piece that turns by a right angle has frames off by 2e-4; with 8 by 1e-5.
-/// More parts only cost time.
+/// Parts that a piece of the spline is cut in, for its table of arc lengths and frames. On a helix with a control point
+/// every quarter turn, frames are off by 5e-5 radians a piece with 4 parts, by 1e-6 with 8; more parts only cost time.
 const PARTS: usize = 8;
 
 /// A Catmull-Rom spline through control points, by arc length, with rotation-minimising frames.

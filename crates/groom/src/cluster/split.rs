@@ -5,17 +5,17 @@ use super::{Cluster, Contour, Curve, Cylinder, Region, Shape, Tree};
 use pelage_geom::{NONE, Vec3};
 use std::f64::consts::TAU;
 
-/// Angles of a child's contour. With 12, corners between neighbours are cut off by a twentieth of a child's width; more
-/// than 24 only take room.
+/// Angles of a child's contour. Of the parent's region, 5 % are in none or several of its children's with 12, 1.5 % with
+/// 24, 0.5 % with 48, which are twice as many numbers to store and to evaluate.
 const ANGLES: usize = 24;
 
-/// Relaxation: points a child that stand for the region, and rounds. With 100 points areas differ by a few per cent
-/// more; with a third of the rounds some cells stay twice as long as wide.
+/// Relaxation: points a child that stand for the region, and rounds. In a bent region, areas of 12 children differ by
+/// 11 % (rms) with 100 points, by 10 % with 20 rounds, by 6 % with these and with more.
 const SAMPLES: usize = 400;
 const ROUNDS: usize = 60;
 
-/// Stations for each turn of a parent's twist. With 4 a child's skeleton, a helix, is off by a tenth of its radius;
-/// more than 8 are in the way of who edits it.
+/// Stations for each turn of a parent's twist. The radius of a child's skeleton, a helix, is off by 12 % with 4, by 1 %
+/// with 8 (5 % in its first and last piece); more than 8 are in the way of who edits it.
 const PER_TURN: f64 = 8.0;
 
 /// Splits a cluster without children into `n`, and gives their numbers.
