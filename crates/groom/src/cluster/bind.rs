@@ -3,9 +3,9 @@
 use super::{Curve, Cylinder, Shape, Tree};
 use pelage_geom::{NONE, Vec3};
 
-/// What a way along the skeleton counts against a way across it, where a point lies in several sections: with 0, a child
-/// of a tight curl is bound to whichever turn is near; with much more than 1, a child that is more curled than its parent
-/// is bound too near to its tip.
+/// What a way along the skeleton counts against a way across it, where a point lies in several sections: with 0, a
+/// child of a tight curl is bound to whichever turn is near; with much more than 1, a child that is more curled than
+/// its parent is bound too near to its tip.
 const ALONG: f64 = 0.5;
 
 /// A section whose narrow side is less than this fraction of the cluster's largest width has no room to tell points

@@ -5,8 +5,8 @@ use super::{Cluster, Contour, Curve, Cylinder, Region, Shape, Tree};
 use pelage_geom::{NONE, Vec3};
 use std::f64::consts::TAU;
 
-/// Angles of a child's contour. Of the parent's region, 5 % are in none or several of its children's with 12, 1.5 % with
-/// 24, 0.5 % with 48, which are twice as many numbers to store and to evaluate.
+/// Angles of a child's contour. Of the parent's region, 5 % are in none or several of its children's with 12, 1.5 %
+/// with 24, 0.5 % with 48, which are twice as many numbers to store and to evaluate.
 const ANGLES: usize = 24;
 
 /// Relaxation: points a child that stand for the region, and rounds. In a bent region, areas of 12 children differ by
