@@ -6,6 +6,7 @@ pub mod areas;
 mod box_tree;
 pub mod candidates;
 mod chart_cut;
+pub mod cluster;
 pub mod comb;
 pub mod control;
 pub mod depenetrate;
