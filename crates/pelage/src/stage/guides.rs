@@ -17,6 +17,9 @@ use pelage_groom::flow::{self, Body, Fast, Grid, OPENING, coarse};
 /// where the flow nearly rests. Twice as many take eight times as long to fill.
 const CELLS: f64 = 60.0;
 
+/// Steps of lines in chords of the longest: with 1, hair that a field turns round within a chord goes straight on instead.
+const STEP: f64 = 0.25;
+
 /// Lines from which on a grid is worth filling.
 const MANY: usize = 2000;
 
@@ -50,7 +53,9 @@ pub(super) fn guides(run: &mut Runner<'_>) -> Result<Vec<Option<Guides>>, Error>
 impl Guides {
     /// Lines of `points` points from the roots of hairs, out of the skin.
     pub(super) fn lines(&self, points: usize, guard: &Guard<'_>, starts: &[Start]) -> Lines {
-        let settings = Trace { points, step: 0.0, reverse: false, slow: 0.0 };
+        let longest = starts.iter().map(|s| s.length).fold(0.0, f64::max);
+        let step = longest / points.max(2).saturating_sub(1) as f64 * STEP;
+        let settings = Trace { points, step, reverse: false, slow: 0.0 };
         match self {
             Guides::Field(field) => field.trace(starts, &settings, Some(guard)),
             Guides::Shear(_) => Lines::default(),
