@@ -1,0 +1,399 @@
+//! All pairs of hairs that meet, and a report on a groom.
+//!
+//! Golodetz 2007, §5.2 compares every link with every other. Here runs of links are bounded twice: by boxes, which are
+//! in one tree for all hairs, and by a wider capsule around the segment between their ends, which fits long runs that
+//! lie askew of the axes. What is found is the same.
+
+use super::Chains;
+use super::segment::{approach, point_distance};
+use pelage_geom::Vec3;
+use rayon::prelude::*;
+
+/// Links a run holds at most. Speed alone depends on it.
+const RUN: usize = 3;
+
+/// Runs a leaf of the tree holds at most. Speed alone depends on it.
+const LEAF: usize = 4;
+
+/// Two hairs and where they are nearest to each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pair {
+    /// The hairs, the lower first.
+    pub hair: [u32; 2],
+    /// Distance between their surfaces, scene units; below 0 they meet, and it is how deep.
+    ///
+    /// Where chains bound splines it is the least that the distance of the thick curves can be; the most is this plus
+    /// twice what either link is wider than its curve.
+    pub gap: f64,
+    /// The links, each counted from its hair's root.
+    pub link: [u32; 2],
+    /// Places on their axes, from 0 to 1.
+    pub at: [f64; 2],
+}
+
+/// What [`check`] found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Check {
+    /// Hairs there are.
+    pub hairs: usize,
+    /// Pairs within the margin.
+    pub near: usize,
+    /// Pairs that meet.
+    pub meeting: usize,
+    /// Hairs that meet some other.
+    pub hairs_meeting: usize,
+    /// Greatest depth of a pair, scene units; 0 if none meet.
+    pub deepest: f64,
+    /// The pairs of least gap, the worst first; of equals the lower hairs first.
+    pub worst: Vec<Pair>,
+}
+
+/// Counts pairs of hairs that meet or come within `margin` (0 or more, scene units), and lists the `worst` of them.
+pub fn check(chains: &Chains, margin: f64, worst: usize) -> Result<Check, String> {
+    if !(margin >= 0.0 && margin.is_finite()) {
+        return Err(format!("a margin is 0 or more, not {margin}"));
+    }
+    let mut pairs = near_pairs(chains, margin);
+    let mut meets = vec![false; chains.len()];
+    for p in pairs.iter().filter(|p| p.gap < 0.0) {
+        p.hair.iter().for_each(|&s| meets[s as usize] = true);
+    }
+    let mut report = Check {
+        hairs: chains.len(),
+        near: pairs.len(),
+        meeting: pairs.iter().filter(|p| p.gap < 0.0).count(),
+        hairs_meeting: meets.iter().filter(|m| **m).count(),
+        ..Check::default()
+    };
+    let order = |a: &Pair, b: &Pair| a.gap.total_cmp(&b.gap).then(a.hair.cmp(&b.hair));
+    if worst > 0 && worst < pairs.len() {
+        pairs.select_nth_unstable_by(worst - 1, order);
+    }
+    report.deepest = pairs.iter().map(|p| -p.gap).fold(0.0, f64::max);
+    pairs.truncate(worst);
+    pairs.sort_unstable_by(order);
+    report.worst = pairs;
+    Ok(report)
+}
+
+/// All pairs of hairs whose surfaces come within `margin` (scene units; below 0: that meet deeper than that), each once
+/// with its least gap, in the order of their hairs. Links of one hair are not compared with each other.
+pub fn near_pairs(chains: &Chains, margin: f64) -> Vec<Pair> {
+    let tree = Tree::new(chains);
+    let of = |s: usize| tree.pairs_of(s as u32, margin);
+    (0..chains.len()).into_par_iter().map(of).collect::<Vec<_>>().concat()
+}
+
+/// Nearest place of two hairs of `chains`; `None` if one of them has no links.
+pub fn nearest(chains: &Chains, hair: [u32; 2]) -> Option<Pair> {
+    let runs = hair.map(|s| runs_of(chains, s));
+    let mut best: Option<Pair> = None;
+    for (a, b) in runs[0].iter().flat_map(|a| runs[1].iter().map(move |b| (a, b))) {
+        let limit = best.map_or(f64::MAX, |p| p.gap);
+        compare(chains, a, b, limit, &mut |p| best = nearer(best, p));
+    }
+    best
+}
+
+fn nearer(best: Option<Pair>, p: Pair) -> Option<Pair> {
+    if best.is_none_or(|b| p.gap < b.gap) { Some(p) } else { best }
+}
+
+/// Links `first` to `first + links` of a hair: within `radius` of the segment `axis`, and within a box.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    hair: u32,
+    first: u32,
+    links: u32,
+    axis: [Vec3; 2],
+    radius: f64,
+    low: Vec3,
+    high: Vec3,
+}
+
+fn runs_of(chains: &Chains, hair: u32) -> Vec<Run> {
+    let s = hair as usize;
+    let links = chains.links(s);
+    // Runs of like lengths.
+    let count = links.div_ceil(RUN);
+    (0..count).map(|k| Run::new(chains, hair, k * links / count, (k + 1) * links / count)).collect()
+}
+
+impl Run {
+    fn new(chains: &Chains, hair: u32, first: usize, end: usize) -> Run {
+        let s = hair as usize;
+        let axis = [chains.link(s, first).axis[0], chains.link(s, end - 1).axis[1]];
+        let (mut low, mut high, mut radius) = (axis[0], axis[0], 0.0f64);
+        for k in first..end {
+            let link = chains.link(s, k);
+            for p in link.axis {
+                // A convex function is largest at an end of a link's axis.
+                radius = radius.max(point_distance(p, axis) + link.radius);
+                low = low.inf(&p.map(|x| x - link.radius));
+                high = high.sup(&p.map(|x| x + link.radius));
+            }
+        }
+        // What rounding may take off distances between points of this size, many times over.
+        let slack = 1e-13 * low.amax().max(high.amax());
+        Run {
+            hair,
+            first: first as u32,
+            links: (end - first) as u32,
+            axis,
+            radius: radius + slack,
+            low: low.map(|x| x - slack),
+            high: high.map(|x| x + slack),
+        }
+    }
+}
+
+/// Hands over all pairs of links of two runs whose gap is at most `limit`.
+fn compare(chains: &Chains, a: &Run, b: &Run, limit: f64, take: &mut impl FnMut(Pair)) {
+    if approach(a.axis, b.axis).distance - a.radius - b.radius > limit {
+        return;
+    }
+    for i in a.first..a.first + a.links {
+        let one = chains.link(a.hair as usize, i as usize);
+        for j in b.first..b.first + b.links {
+            let other = chains.link(b.hair as usize, j as usize);
+            let closest = approach(one.axis, other.axis);
+            let gap = closest.distance - (one.radius + other.radius);
+            if gap <= limit {
+                take(Pair { hair: [a.hair, b.hair], gap, link: [i, j], at: closest.at });
+            }
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    low: Vec3,
+    high: Vec3,
+    /// Leaf: first entry of `order`. Else: the second child (the first is the next node).
+    next: u32,
+    /// Runs of a leaf; 0 for an inner node.
+    count: u32,
+    /// Highest hair of its runs.
+    last: u32,
+}
+
+/// Boxes around the runs of all hairs.
+struct Tree<'a> {
+    chains: &'a Chains,
+    /// By hair, and `first[s]..first[s + 1]` are those of hair `s`.
+    run: Vec<Run>,
+    first: Vec<u32>,
+    node: Vec<Node>,
+    order: Vec<u32>,
+}
+
+impl<'a> Tree<'a> {
+    fn new(chains: &'a Chains) -> Self {
+        let each: Vec<Vec<Run>> = (0..chains.len() as u32).into_par_iter().map(|s| runs_of(chains, s)).collect();
+        let mut first = vec![0u32];
+        for runs in &each {
+            first.push(first[first.len() - 1] + runs.len() as u32);
+        }
+        let run = each.concat();
+        let order = (0..run.len() as u32).collect();
+        let mut tree = Tree { chains, run, first, node: Vec::new(), order };
+        if !tree.run.is_empty() {
+            tree.grow(0, tree.run.len());
+        }
+        tree
+    }
+
+    fn grow(&mut self, begin: usize, end: usize) {
+        let run = &self.run;
+        let items = &mut self.order[begin..end];
+        let some = run[items[0] as usize];
+        let (mut low, mut high, mut last) = (some.low, some.high, 0);
+        for r in items.iter().map(|&i| &run[i as usize]) {
+            (low, high, last) = (low.inf(&r.low), high.sup(&r.high), r.hair.max(last));
+        }
+        let at = self.node.len();
+        self.node.push(Node { low, high, next: begin as u32, count: (end - begin) as u32, last });
+        if end - begin > LEAF {
+            let axis = (high - low).imax();
+            let centre = |i: u32| run[i as usize].low[axis] + run[i as usize].high[axis];
+            let half = (end - begin) / 2;
+            items.select_nth_unstable_by(half, |&a, &b| centre(a).total_cmp(&centre(b)).then(a.cmp(&b)));
+            self.grow(begin, begin + half);
+            let second = self.node.len() as u32;
+            self.grow(begin + half, end);
+            (self.node[at].next, self.node[at].count) = (second, 0);
+        }
+    }
+
+    /// Pairs of hair `s` with later ones, by the other hair.
+    fn pairs_of(&self, s: u32, margin: f64) -> Vec<Pair> {
+        let mut found: Vec<Pair> = Vec::new();
+        // The tree halves its items, so 2^32 of them are 32 levels deep.
+        let mut stack: Vec<u32> = Vec::with_capacity(64);
+        for a in &self.run[self.first[s as usize] as usize..self.first[s as usize + 1] as usize] {
+            let (low, high) = (a.low.map(|x| x - margin), a.high.map(|x| x + margin));
+            let apart = |l: &Vec3, h: &Vec3| (0..3).any(|i| l[i] > high[i] || h[i] < low[i]);
+            stack.push(0);
+            while let Some(n) = stack.pop() {
+                let node = &self.node[n as usize];
+                if node.last <= s || apart(&node.low, &node.high) {
+                    continue;
+                }
+                if node.count == 0 {
+                    stack.push(node.next);
+                    stack.push(n + 1);
+                    continue;
+                }
+                for &i in &self.order[node.next as usize..(node.next + node.count) as usize] {
+                    let b = &self.run[i as usize];
+                    if b.hair > s && !apart(&b.low, &b.high) {
+                        compare(self.chains, a, b, margin, &mut |p| found.push(p));
+                    }
+                }
+            }
+        }
+        found.sort_unstable_by(|p, q| {
+            p.hair.cmp(&q.hair).then(p.gap.total_cmp(&q.gap)).then_with(|| p.link.cmp(&q.link))
+        });
+        found.dedup_by_key(|p| p.hair);
+        found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spline::BSpline;
+    use pelage_geom::{Offsets, rng};
+
+    /// Curly hairs of 0 to `most` points, their roots in a square of the given side.
+    fn groom(hairs: u64, most: u64, side: f64) -> (Vec<[f32; 3]>, Offsets, Vec<f32>) {
+        let count = |s: u64| if s % 17 == 0 { s as usize / 17 % 3 } else { (most - s % 5) as usize };
+        let offsets = Offsets::from_counts((0..hairs).map(count));
+        let (mut position, mut radius) = (Vec::new(), Vec::new());
+        for s in 0..hairs {
+            let mut p =
+                Vec3::from_fn(|i, _| side * rng::uniform(7, s, 0, i as u64)).component_mul(&Vec3::new(1.0, 1.0, 0.0));
+            for k in 0..count(s) as u64 {
+                position.push(p.cast::<f32>().into());
+                radius.push((0.02 + 0.03 * rng::uniform(7, s, 1, k)) as f32);
+                p += Vec3::from_fn(|i, _| 0.4 * rng::uniform(7, s, 2 + k, i as u64) - 0.15);
+            }
+        }
+        (position, offsets, radius)
+    }
+
+    fn brute(chains: &Chains, margin: f64) -> Vec<Pair> {
+        let mut all = Vec::new();
+        for s in 0..chains.len() {
+            for t in s + 1..chains.len() {
+                let mut best: Option<Pair> = None;
+                for i in 0..chains.links(s) {
+                    for j in 0..chains.links(t) {
+                        let (a, b) = (chains.link(s, i), chains.link(t, j));
+                        let closest = approach(a.axis, b.axis);
+                        let gap = closest.distance - (a.radius + b.radius);
+                        let (hair, link) = ([s as u32, t as u32], [i as u32, j as u32]);
+                        best = nearer(best, Pair { hair, gap, link, at: closest.at });
+                    }
+                }
+                all.extend(best.filter(|p| p.gap <= margin));
+            }
+        }
+        all
+    }
+
+    #[test]
+    fn pairs_are_those_of_all_links_with_all() {
+        let (position, offsets, radius) = groom(240, 14, 6.0);
+        for scale in [1.0, 1e6] {
+            // Far from the origin and large: what rounding takes must not lose a pair.
+            let far = |p: &[f32; 3]| p.map(|x| (x + 3.0) * scale);
+            let position: Vec<[f32; 3]> = position.iter().map(far).collect();
+            let radius: Vec<f32> = radius.iter().map(|r| r * scale).collect();
+            let chains = Chains::of_polylines(&position, &offsets, &radius).expect("chains");
+            let all = brute(&chains, f64::from(scale));
+            for margin in [0.0, -0.03, 0.1, 0.8].map(|m| m * f64::from(scale)) {
+                let want: Vec<Pair> = all.iter().filter(|p| p.gap <= margin).copied().collect();
+                assert!(want.len() > 50 && want.len() < 20_000, "{}", want.len());
+                assert_eq!(near_pairs(&chains, margin), want, "{margin}");
+                for p in want.iter().step_by(31) {
+                    assert_eq!(nearest(&chains, p.hair), Some(*p));
+                }
+            }
+            // A margin that is exactly a gap holds it.
+            assert!(near_pairs(&chains, all[5].gap).contains(&all[5]));
+        }
+        assert!(nearest(&Chains::of_polylines(&[], &Offsets::uniform(2, 0), &[]).expect("chains"), [0, 1]).is_none());
+    }
+
+    #[test]
+    fn pairs_do_not_depend_on_threads() {
+        let (position, offsets, radius) = groom(400, 10, 5.0);
+        let chains = Chains::of_polylines(&position, &offsets, &radius).expect("chains");
+        let with = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            pool.install(|| near_pairs(&chains, 0.05))
+        };
+        let (one, three) = (with(1), with(3));
+        assert!(!one.is_empty() && one == three);
+    }
+
+    #[test]
+    fn a_check_counts_and_lists_the_worst() {
+        let (position, offsets, radius) = groom(200, 12, 5.0);
+        let chains = Chains::of_polylines(&position, &offsets, &radius).expect("chains");
+        let mut all = brute(&chains, 0.05);
+        let report = check(&chains, 0.05, 10).expect("a report");
+        let meeting: Vec<&Pair> = all.iter().filter(|p| p.gap < 0.0).collect();
+        let mut hairs: Vec<u32> = meeting.iter().flat_map(|p| p.hair).collect();
+        hairs.sort_unstable();
+        hairs.dedup();
+        assert_eq!((report.hairs, report.near), (200, all.len()));
+        assert_eq!((report.meeting, report.hairs_meeting), (meeting.len(), hairs.len()));
+        all.sort_by(|a, b| a.gap.total_cmp(&b.gap));
+        assert!(report.worst == all[..10] && report.deepest == -all[0].gap && report.deepest > 0.0);
+        let whole = check(&chains, 0.05, usize::MAX).expect("a report");
+        assert!(whole.worst == all && whole.deepest == report.deepest);
+        assert_eq!(check(&chains, 0.05, 0).expect("a report").deepest, report.deepest);
+        assert!(check(&chains, f64::NAN, 1).is_err() && check(&chains, -1.0, 1).is_err());
+        let none = Chains::of_polylines(&[], &Offsets::default(), &[]).expect("chains");
+        assert_eq!(check(&none, 0.1, 5), Ok(Check::default()));
+        // Crossing hairs in the one place where they do, as deep as both are thick.
+        let cross = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, -1.0, 0.0], [0.5, 3.0, 0.0]];
+        let chains = Chains::of_polylines(&cross, &Offsets::uniform(2, 2), &[0.25; 4]).expect("chains");
+        let p = check(&chains, 0.0, 1).expect("a report").worst[0];
+        assert_eq!((p.hair, p.gap, p.link, p.at), ([0, 1], -0.5, [0, 0], [0.75, 0.25]));
+    }
+
+    #[test]
+    fn gaps_of_bounded_splines_are_within_what_is_stated() {
+        let curve: Vec<BSpline> = (0..40)
+            .map(|s| BSpline {
+                control: (0..8)
+                    .map(|k| Vec3::from_fn(|i, _| rng::uniform(9, s, k, i as u64)) * 1.5 + Vec3::z() * (0.3 * k as f64))
+                    .collect(),
+            })
+            .collect();
+        let dense: Vec<Vec<Vec3>> = curve.iter().map(|c| c.points(161)).collect();
+        let radius: Vec<f64> = (0..40).map(|s| 0.02 + 0.002 * f64::from(s)).collect();
+        let tolerance = 0.02;
+        let chains = Chains::of_splines(&curve, &radius, tolerance).expect("chains");
+        let mut seen = 0;
+        for s in 0..40 {
+            for t in s + 1..40 {
+                let segments = |h: usize| dense[h].windows(2).map(|w| [w[0], w[1]]);
+                let true_gap = segments(s)
+                    .flat_map(|a| segments(t).map(move |b| approach(a, b).distance))
+                    .fold(f64::MAX, f64::min)
+                    - radius[s]
+                    - radius[t];
+                let p = nearest(&chains, [s as u32, t as u32]).expect("a pair");
+                // Chords of the dense polyline are off by less than 1e-3.
+                assert!(p.gap < true_gap + 2e-3 && true_gap < p.gap + 4.0 * tolerance + 2e-3, "{} {true_gap}", p.gap);
+                seen += usize::from(true_gap < 0.0);
+            }
+        }
+        assert!(seen > 20, "{seen}");
+    }
+}
