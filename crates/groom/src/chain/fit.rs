@@ -9,8 +9,8 @@ use super::segment::point_distance;
 use crate::spline::BSpline;
 use pelage_geom::Vec3;
 
-/// A link's end is sought to this part of its length: each halving costs a bound more, and coarser ones cost links.
-const REACH: f64 = 1e-3;
+/// A link is long enough when it uses this part of the tolerance: more costs time, 0.9 a twentieth more links.
+const ENOUGH: f64 = 0.97;
 
 /// Links a spline may need. More is a tolerance that was mistyped, or coordinates too large for it.
 const MOST: usize = 100_000;
@@ -46,30 +46,40 @@ pub fn fit(curve: &BSpline, tolerance: f64) -> Result<Fitted, String> {
         if fitted.off.len() == MOST {
             return Err(format!("a tolerance of {tolerance} takes more than {MOST} links"));
         }
-        let (mut to, mut off) = (pieces, deviation(curve, from, pieces));
-        if off > tolerance {
-            // Halve until it holds, then between the last that holds and the last that does not.
-            let mut high = to;
-            while off > tolerance {
-                high = to;
-                to = 0.5 * (from + to);
-                if to <= from || to >= high {
-                    return Err(format!("a tolerance of {tolerance} is below the rounding of the curve's points"));
-                }
-                off = deviation(curve, from, to);
-            }
-            while high - to > REACH * (to - from) {
-                let middle = 0.5 * (to + high);
-                let at = deviation(curve, from, middle);
-                if at > tolerance { high = middle } else { (to, off) = (middle, at) }
-            }
-        }
+        let (to, off) = reach(curve, from, tolerance)
+            .ok_or_else(|| format!("a tolerance of {tolerance} is below the rounding of the curve's points"))?;
         fitted.parameter.push(to / pieces);
         fitted.joint.push(curve.at(to / pieces));
         fitted.off.push(off);
         from = to;
     }
     Ok(fitted)
+}
+
+/// How far a link from a place may go, and its deviation; `None` if it gets nowhere.
+fn reach(curve: &BSpline, from: f64, tolerance: f64) -> Option<(f64, f64)> {
+    let end = (curve.control.len() - 3) as f64;
+    let (mut low, mut high, mut found) = (from, end, 0.0);
+    let mut to = end;
+    loop {
+        let off = deviation(curve, from, to);
+        if off <= tolerance {
+            (low, found) = (to, off);
+        } else {
+            high = to;
+        }
+        if to == end && low == end || found > ENOUGH * tolerance || (high - low) <= 1e-3 * (low - from) {
+            return Some((low, found));
+        }
+        // The deviation grows as the square of the length, or nearly.
+        let middle = 0.5 * (low + high);
+        let guess = from + (to - from) * (0.5 * (1.0 + ENOUGH) * tolerance / off).sqrt();
+        let aside = 0.02 * (high - low);
+        to = if guess > low + aside && guess < high - aside { guess } else { middle };
+        if to <= low || to >= high {
+            return (low > from).then_some((low, found));
+        }
+    }
 }
 
 /// Bound of the distance of the curve from its chord between two places, in pieces from the root.

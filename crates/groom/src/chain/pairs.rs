@@ -1,18 +1,23 @@
 //! All pairs of hairs that meet, and a report on a groom.
 //!
-//! Golodetz 2007, §5.2 compares every link with every other. Here runs of links are bounded twice: by boxes, which are
-//! in one tree for all hairs, and by a wider capsule around the segment between their ends, which fits long runs that
-//! lie askew of the axes. What is found is the same.
+//! Golodetz 2007, §5.2 compares every link with every other. Here hairs are cut into stretches about as long as their
+//! neighbours are apart (runs of short links, parts of long ones), which are bounded twice: by boxes, in one tree for all
+//! hairs, and by a wider capsule around the segment between their ends, which fits what lies askew of the axes. What is
+//! found is the same.
 
 use super::Chains;
 use super::segment::{approach, point_distance};
 use pelage_geom::Vec3;
 use rayon::prelude::*;
+use std::ops::Range;
 
-/// Links a run holds at most. Speed alone depends on it.
-const RUN: usize = 3;
+/// Length of a stretch over the mean distance of neighbouring hairs. Speed alone depends on it.
+const STRETCH: f64 = 4.0;
 
-/// Runs a leaf of the tree holds at most. Speed alone depends on it.
+/// Stretches there may be for each link at most. Memory and speed depend on it.
+const PARTS: f64 = 4.0;
+
+/// Stretches a leaf of the tree holds at most. Speed alone depends on it.
 const LEAF: usize = 4;
 
 /// Two hairs and where they are nearest to each other.
@@ -86,9 +91,9 @@ pub fn near_pairs(chains: &Chains, margin: f64) -> Vec<Pair> {
 
 /// Nearest place of two hairs of `chains`; `None` if one of them has no links.
 pub fn nearest(chains: &Chains, hair: [u32; 2]) -> Option<Pair> {
-    let runs = hair.map(|s| runs_of(chains, s));
     let mut best: Option<Pair> = None;
-    for (a, b) in runs[0].iter().flat_map(|a| runs[1].iter().map(move |b| (a, b))) {
+    let both = hair.map(|s| stretches(chains, s, f64::MAX, 4));
+    for (a, b) in both[0].iter().flat_map(|a| both[1].iter().map(move |b| (a, b))) {
         let limit = best.map_or(f64::MAX, |p| p.gap);
         compare(chains, a, b, limit, &mut |p| best = nearer(best, p));
     }
@@ -99,9 +104,9 @@ fn nearer(best: Option<Pair>, p: Pair) -> Option<Pair> {
     if best.is_none_or(|b| p.gap < b.gap) { Some(p) } else { best }
 }
 
-/// Links `first` to `first + links` of a hair: within `radius` of the segment `axis`, and within a box.
+/// Links of a hair from `first` on, or a part of one: within `radius` of the segment `axis`, and within a box.
 #[derive(Clone, Copy, Debug)]
-struct Run {
+struct Stretch {
     hair: u32,
     first: u32,
     links: u32,
@@ -111,34 +116,75 @@ struct Run {
     high: Vec3,
 }
 
-fn runs_of(chains: &Chains, hair: u32) -> Vec<Run> {
+/// A hair in stretches of about the given length, of no more than `most` links.
+fn stretches(chains: &Chains, hair: u32, length: f64, most: usize) -> Vec<Stretch> {
     let s = hair as usize;
-    let links = chains.links(s);
-    // Runs of like lengths.
-    let count = links.div_ceil(RUN);
-    (0..count).map(|k| Run::new(chains, hair, k * links / count, (k + 1) * links / count)).collect()
+    let size = |k: usize| {
+        let axis = chains.link(s, k).axis;
+        (axis[1] - axis[0]).norm()
+    };
+    let mut out = Vec::new();
+    let mut first = 0;
+    while first < chains.links(s) {
+        let (mut end, mut sum) = (first + 1, size(first));
+        if sum > length {
+            let axis = chains.link(s, first).axis;
+            let parts = libm::ceil(sum / length) as usize;
+            let at = |k: usize| axis[0].lerp(&axis[1], k as f64 / parts as f64);
+            out.extend((0..parts).map(|k| Stretch::new(chains, hair, first..end, [at(k), at(k + 1)])));
+        } else {
+            while end < chains.links(s) && end - first < most && sum + size(end) <= length {
+                sum += size(end);
+                end += 1;
+            }
+            let axis = [chains.link(s, first).axis[0], chains.link(s, end - 1).axis[1]];
+            out.push(Stretch::new(chains, hair, first..end, axis));
+        }
+        first = end;
+    }
+    out
 }
 
-impl Run {
-    fn new(chains: &Chains, hair: u32, first: usize, end: usize) -> Run {
+/// Mean length of a stretch for [`stretches`].
+fn stretch_length(chains: &Chains) -> f64 {
+    let (mut low, mut high) = (Vec3::repeat(f64::MAX), Vec3::repeat(f64::MIN));
+    let (mut total, mut links, mut thick) = (0.0, 0.0, 0.0);
+    for s in 0..chains.len() {
+        for link in (0..chains.links(s)).map(|k| chains.link(s, k)) {
+            (low, high) = (low.inf(&link.axis[0]), high.sup(&link.axis[0]));
+            total += (link.axis[1] - link.axis[0]).norm();
+            thick += link.radius;
+            links += 1.0;
+        }
+    }
+    // A hair has the cross-section that the total length leaves of the volume.
+    let apart = ((high - low).product() / total).sqrt();
+    let length = (STRETCH * apart).max(total / (PARTS * links)).max(thick / links);
+    if length.is_finite() { length } else { f64::MAX }
+}
+
+impl Stretch {
+    fn new(chains: &Chains, hair: u32, links: Range<usize>, axis: [Vec3; 2]) -> Stretch {
         let s = hair as usize;
-        let axis = [chains.link(s, first).axis[0], chains.link(s, end - 1).axis[1]];
-        let (mut low, mut high, mut radius) = (axis[0], axis[0], 0.0f64);
-        for k in first..end {
-            let link = chains.link(s, k);
-            for p in link.axis {
-                // A convex function is largest at an end of a link's axis.
-                radius = radius.max(point_distance(p, axis) + link.radius);
-                low = low.inf(&p.map(|x| x - link.radius));
-                high = high.sup(&p.map(|x| x + link.radius));
+        let mut radius = chains.link(s, links.start).radius;
+        let mut low = axis[0].inf(&axis[1]).map(|x| x - radius);
+        let mut high = axis[0].sup(&axis[1]).map(|x| x + radius);
+        if links.len() > 1 {
+            for link in links.clone().map(|k| chains.link(s, k)) {
+                for p in link.axis {
+                    // A convex function is largest at an end of a link's axis.
+                    radius = radius.max(point_distance(p, axis) + link.radius);
+                    low = low.inf(&p.map(|x| x - link.radius));
+                    high = high.sup(&p.map(|x| x + link.radius));
+                }
             }
         }
         // What rounding may take off distances between points of this size, many times over.
         let slack = 1e-13 * low.amax().max(high.amax());
-        Run {
+        Stretch {
             hair,
-            first: first as u32,
-            links: (end - first) as u32,
+            first: links.start as u32,
+            links: links.len() as u32,
             axis,
             radius: radius + slack,
             low: low.map(|x| x - slack),
@@ -147,8 +193,8 @@ impl Run {
     }
 }
 
-/// Hands over all pairs of links of two runs whose gap is at most `limit`.
-fn compare(chains: &Chains, a: &Run, b: &Run, limit: f64, take: &mut impl FnMut(Pair)) {
+/// Hands over all pairs of links of two stretches whose gap is at most `limit`.
+fn compare(chains: &Chains, a: &Stretch, b: &Stretch, limit: f64, take: &mut impl FnMut(Pair)) {
     if approach(a.axis, b.axis).distance - a.radius - b.radius > limit {
         return;
     }
@@ -171,17 +217,17 @@ struct Node {
     high: Vec3,
     /// Leaf: first entry of `order`. Else: the second child (the first is the next node).
     next: u32,
-    /// Runs of a leaf; 0 for an inner node.
+    /// Stretches of a leaf; 0 for an inner node.
     count: u32,
-    /// Highest hair of its runs.
+    /// Highest hair of its stretches.
     last: u32,
 }
 
-/// Boxes around the runs of all hairs.
+/// Boxes around the stretches of all hairs.
 struct Tree<'a> {
     chains: &'a Chains,
-    /// By hair, and `first[s]..first[s + 1]` are those of hair `s`.
-    run: Vec<Run>,
+    /// By hair; `first[s]..first[s + 1]` are those of hair `s`.
+    stretch: Vec<Stretch>,
     first: Vec<u32>,
     node: Vec<Node>,
     order: Vec<u32>,
@@ -189,33 +235,35 @@ struct Tree<'a> {
 
 impl<'a> Tree<'a> {
     fn new(chains: &'a Chains) -> Self {
-        let each: Vec<Vec<Run>> = (0..chains.len() as u32).into_par_iter().map(|s| runs_of(chains, s)).collect();
+        let length = stretch_length(chains);
+        let cut = |s: u32| stretches(chains, s, length, usize::MAX);
+        let each: Vec<Vec<Stretch>> = (0..chains.len() as u32).into_par_iter().map(cut).collect();
         let mut first = vec![0u32];
-        for runs in &each {
-            first.push(first[first.len() - 1] + runs.len() as u32);
+        for cut in &each {
+            first.push(first[first.len() - 1] + cut.len() as u32);
         }
-        let run = each.concat();
-        let order = (0..run.len() as u32).collect();
-        let mut tree = Tree { chains, run, first, node: Vec::new(), order };
-        if !tree.run.is_empty() {
-            tree.grow(0, tree.run.len());
+        let stretch = each.concat();
+        let order = (0..stretch.len() as u32).collect();
+        let mut tree = Tree { chains, stretch, first, node: Vec::new(), order };
+        if !tree.stretch.is_empty() {
+            tree.grow(0, tree.stretch.len());
         }
         tree
     }
 
     fn grow(&mut self, begin: usize, end: usize) {
-        let run = &self.run;
+        let stretch = &self.stretch;
         let items = &mut self.order[begin..end];
-        let some = run[items[0] as usize];
+        let some = stretch[items[0] as usize];
         let (mut low, mut high, mut last) = (some.low, some.high, 0);
-        for r in items.iter().map(|&i| &run[i as usize]) {
+        for r in items.iter().map(|&i| &stretch[i as usize]) {
             (low, high, last) = (low.inf(&r.low), high.sup(&r.high), r.hair.max(last));
         }
         let at = self.node.len();
         self.node.push(Node { low, high, next: begin as u32, count: (end - begin) as u32, last });
         if end - begin > LEAF {
             let axis = (high - low).imax();
-            let centre = |i: u32| run[i as usize].low[axis] + run[i as usize].high[axis];
+            let centre = |i: u32| stretch[i as usize].low[axis] + stretch[i as usize].high[axis];
             let half = (end - begin) / 2;
             items.select_nth_unstable_by(half, |&a, &b| centre(a).total_cmp(&centre(b)).then(a.cmp(&b)));
             self.grow(begin, begin + half);
@@ -230,7 +278,7 @@ impl<'a> Tree<'a> {
         let mut found: Vec<Pair> = Vec::new();
         // The tree halves its items, so 2^32 of them are 32 levels deep.
         let mut stack: Vec<u32> = Vec::with_capacity(64);
-        for a in &self.run[self.first[s as usize] as usize..self.first[s as usize + 1] as usize] {
+        for a in &self.stretch[self.first[s as usize] as usize..self.first[s as usize + 1] as usize] {
             let (low, high) = (a.low.map(|x| x - margin), a.high.map(|x| x + margin));
             let apart = |l: &Vec3, h: &Vec3| (0..3).any(|i| l[i] > high[i] || h[i] < low[i]);
             stack.push(0);
@@ -245,7 +293,7 @@ impl<'a> Tree<'a> {
                     continue;
                 }
                 for &i in &self.order[node.next as usize..(node.next + node.count) as usize] {
-                    let b = &self.run[i as usize];
+                    let b = &self.stretch[i as usize];
                     if b.hair > s && !apart(&b.low, &b.high) {
                         compare(self.chains, a, b, margin, &mut |p| found.push(p));
                     }
