@@ -85,8 +85,14 @@ pub fn check(chains: &Chains, margin: f64, worst: usize) -> Result<Check, String
 /// with its least gap, in the order of their hairs. Links of one hair are not compared with each other.
 pub fn near_pairs(chains: &Chains, margin: f64) -> Vec<Pair> {
     let tree = Tree::new(chains);
-    let of = |s: usize| tree.pairs_of(s as u32, margin);
-    (0..chains.len()).into_par_iter().map(of).collect::<Vec<_>>().concat()
+    let leaves: Vec<&Node> = tree.node.iter().filter(|n| n.second == 0).collect();
+    let mut pairs = leaves.par_iter().map(|leaf| tree.pairs_of(leaf, margin)).collect::<Vec<_>>().concat();
+    // A pair of links may be found twice, but is then the same to the last digit: equals may stand in any order.
+    pairs.par_sort_unstable_by(|p, q| {
+        p.hair.cmp(&q.hair).then(p.gap.total_cmp(&q.gap)).then_with(|| p.link.cmp(&q.link))
+    });
+    pairs.dedup_by_key(|p| p.hair);
+    pairs
 }
 
 /// Nearest place of two hairs of `chains`; `None` if one of them has no links.
@@ -215,96 +221,83 @@ fn compare(chains: &Chains, a: &Stretch, b: &Stretch, limit: f64, take: &mut imp
 struct Node {
     low: Vec3,
     high: Vec3,
-    /// Leaf: first entry of `order`. Else: the second child (the first is the next node).
-    next: u32,
-    /// Stretches of a leaf; 0 for an inner node.
-    count: u32,
-    /// Highest hair of its stretches.
-    last: u32,
+    /// Stretches it holds, in the tree's order.
+    begin: u32,
+    end: u32,
+    /// The second child (the first is the next node); 0 for a leaf.
+    second: u32,
 }
 
 /// Boxes around the stretches of all hairs.
 struct Tree<'a> {
     chains: &'a Chains,
-    /// By hair; `first[s]..first[s + 1]` are those of hair `s`.
+    /// Those of a node side by side.
     stretch: Vec<Stretch>,
-    first: Vec<u32>,
     node: Vec<Node>,
-    order: Vec<u32>,
 }
 
 impl<'a> Tree<'a> {
     fn new(chains: &'a Chains) -> Self {
         let length = stretch_length(chains);
         let cut = |s: u32| stretches(chains, s, length, usize::MAX);
-        let each: Vec<Vec<Stretch>> = (0..chains.len() as u32).into_par_iter().map(cut).collect();
-        let mut first = vec![0u32];
-        for cut in &each {
-            first.push(first[first.len() - 1] + cut.len() as u32);
+        let mut stretch = (0..chains.len() as u32).into_par_iter().map(cut).collect::<Vec<_>>().concat();
+        let mut node = Vec::new();
+        if !stretch.is_empty() {
+            grow(&mut stretch, 0, &mut node);
         }
-        let stretch = each.concat();
-        let order = (0..stretch.len() as u32).collect();
-        let mut tree = Tree { chains, stretch, first, node: Vec::new(), order };
-        if !tree.stretch.is_empty() {
-            tree.grow(0, tree.stretch.len());
-        }
-        tree
+        Tree { chains, stretch, node }
     }
 
-    fn grow(&mut self, begin: usize, end: usize) {
-        let stretch = &self.stretch;
-        let items = &mut self.order[begin..end];
-        let some = stretch[items[0] as usize];
-        let (mut low, mut high, mut last) = (some.low, some.high, 0);
-        for r in items.iter().map(|&i| &stretch[i as usize]) {
-            (low, high, last) = (low.inf(&r.low), high.sup(&r.high), r.hair.max(last));
-        }
-        let at = self.node.len();
-        self.node.push(Node { low, high, next: begin as u32, count: (end - begin) as u32, last });
-        if end - begin > LEAF {
-            let axis = (high - low).imax();
-            let centre = |i: u32| stretch[i as usize].low[axis] + stretch[i as usize].high[axis];
-            let half = (end - begin) / 2;
-            items.select_nth_unstable_by(half, |&a, &b| centre(a).total_cmp(&centre(b)).then(a.cmp(&b)));
-            self.grow(begin, begin + half);
-            let second = self.node.len() as u32;
-            self.grow(begin + half, end);
-            (self.node[at].next, self.node[at].count) = (second, 0);
-        }
-    }
-
-    /// Pairs of hair `s` with later ones, by the other hair.
-    fn pairs_of(&self, s: u32, margin: f64) -> Vec<Pair> {
+    /// Pairs of links of a leaf's stretches with later stretches.
+    fn pairs_of(&self, leaf: &Node, margin: f64) -> Vec<Pair> {
         let mut found: Vec<Pair> = Vec::new();
-        // The tree halves its items, so 2^32 of them are 32 levels deep.
-        let mut stack: Vec<u32> = Vec::with_capacity(64);
-        for a in &self.stretch[self.first[s as usize] as usize..self.first[s as usize + 1] as usize] {
-            let (low, high) = (a.low.map(|x| x - margin), a.high.map(|x| x + margin));
-            let apart = |l: &Vec3, h: &Vec3| (0..3).any(|i| l[i] > high[i] || h[i] < low[i]);
-            stack.push(0);
-            while let Some(n) = stack.pop() {
-                let node = &self.node[n as usize];
-                if node.last <= s || apart(&node.low, &node.high) {
-                    continue;
-                }
-                if node.count == 0 {
-                    stack.push(node.next);
-                    stack.push(n + 1);
-                    continue;
-                }
-                for &i in &self.order[node.next as usize..(node.next + node.count) as usize] {
-                    let b = &self.stretch[i as usize];
-                    if b.hair > s && !apart(&b.low, &b.high) {
+        let widen = |x: &Vec3, by: f64| x.map(|x| x + by);
+        let meet = |a: &(Vec3, Vec3), b: &(Vec3, Vec3)| (0..3).all(|i| a.0[i] <= b.1[i] && b.0[i] <= a.1[i]);
+        let around = (widen(&leaf.low, -margin), widen(&leaf.high, margin));
+        let mut stack = vec![0u32];
+        while let Some(n) = stack.pop() {
+            let node = &self.node[n as usize];
+            if node.end <= leaf.begin + 1 || !meet(&around, &(node.low, node.high)) {
+                continue;
+            }
+            if node.second > 0 {
+                stack.push(node.second);
+                stack.push(n + 1);
+                continue;
+            }
+            for i in leaf.begin..leaf.end {
+                let a = &self.stretch[i as usize];
+                let around = (widen(&a.low, -margin), widen(&a.high, margin));
+                for b in &self.stretch[node.begin.max(i + 1).min(node.end) as usize..node.end as usize] {
+                    if a.hair != b.hair && meet(&around, &(b.low, b.high)) {
+                        let (a, b) = if a.hair < b.hair { (a, b) } else { (b, a) };
                         compare(self.chains, a, b, margin, &mut |p| found.push(p));
                     }
                 }
             }
         }
-        found.sort_unstable_by(|p, q| {
-            p.hair.cmp(&q.hair).then(p.gap.total_cmp(&q.gap)).then_with(|| p.link.cmp(&q.link))
-        });
-        found.dedup_by_key(|p| p.hair);
         found
+    }
+}
+
+/// Nodes over stretches, the first of which has number `begin`, put in order as the tree is cut: at the middle one
+/// along the longest side.
+fn grow(stretch: &mut [Stretch], begin: u32, node: &mut Vec<Node>) {
+    let (mut low, mut high) = (stretch[0].low, stretch[0].high);
+    for s in stretch.iter() {
+        (low, high) = (low.inf(&s.low), high.sup(&s.high));
+    }
+    let at = node.len();
+    node.push(Node { low, high, begin, end: begin + stretch.len() as u32, second: 0 });
+    if stretch.len() > LEAF {
+        let axis = (high - low).imax();
+        let half = stretch.len() / 2;
+        let centre = |s: &Stretch| s.low[axis] + s.high[axis];
+        stretch.select_nth_unstable_by(half, |a, b| centre(a).total_cmp(&centre(b)));
+        let (one, other) = stretch.split_at_mut(half);
+        grow(one, begin, node);
+        node[at].second = node.len() as u32;
+        grow(other, begin + half as u32, node);
     }
 }
 
