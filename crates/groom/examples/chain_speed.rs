@@ -39,14 +39,6 @@ fn main() {
         let position: Vec<[f32; 3]> = hairs.iter().flatten().map(|p| p.cast::<f32>().into()).collect();
         let offsets = Offsets::uniform(n, POINTS);
         let mut clock = Instant::now();
-        if std::env::args().count() > 1 {
-            let chains =
-                Chains::of_polylines(&position, &offsets, &vec![RADIUS as f32; position.len()]).expect("chains");
-            let t = Instant::now();
-            let c = pairs::check(&chains, 0.0, 10).unwrap();
-            println!("{n} {} {:?}", c.near, t.elapsed());
-            continue;
-        }
         let mut lap = |what: String| {
             println!("{n} hairs, {what}: {:.0} ms", clock.elapsed().as_secs_f64() * 1e3);
             clock = Instant::now();

@@ -18,7 +18,7 @@ const STRETCH: f64 = 4.0;
 const PARTS: f64 = 4.0;
 
 /// Stretches a leaf of the tree holds at most. Speed alone depends on it.
-const LEAF: usize = 4;
+const LEAF: usize = 8;
 
 /// Two hairs and where they are nearest to each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
