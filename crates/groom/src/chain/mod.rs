@@ -147,8 +147,8 @@ mod tests {
         far[4][1] = f32::NAN;
         assert!(told(&far, &radius).contains("hair 3"));
         let line = BSpline { control: (0..5u8).map(|k| Vec3::x() * f64::from(k)).collect() };
-        assert!(Chains::of_splines(&[line.clone()], &[f64::NAN], 0.1).is_err());
-        assert!(Chains::of_splines(&[line.clone()], &[], 0.1).is_err());
+        assert!(Chains::of_splines(std::slice::from_ref(&line), &[f64::NAN], 0.1).is_err());
+        assert!(Chains::of_splines(std::slice::from_ref(&line), &[], 0.1).is_err());
         let straight = Chains::of_splines(&[line], &[0.5], 0.1).expect("chains");
         assert!(straight.links(0) == 1 && (straight.link(0, 0).radius - 0.5).abs() < 1e-9);
     }

@@ -309,7 +309,7 @@ mod tests {
 
     /// Curly hairs of 0 to `most` points, their roots in a square of the given side.
     fn groom(hairs: u64, most: u64, side: f64) -> (Vec<[f32; 3]>, Offsets, Vec<f32>) {
-        let count = |s: u64| if s % 17 == 0 { s as usize / 17 % 3 } else { (most - s % 5) as usize };
+        let count = |s: u64| if s.is_multiple_of(17) { s as usize / 17 % 3 } else { (most - s % 5) as usize };
         let offsets = Offsets::from_counts((0..hairs).map(count));
         let (mut position, mut radius) = (Vec::new(), Vec::new());
         for s in 0..hairs {
