@@ -308,8 +308,8 @@ mod tests {
     use crate::spline::BSpline;
     use pelage_geom::{Offsets, rng};
 
-    /// Curly hairs of 0 to `most` points, their roots in a square of the given side.
-    fn groom(hairs: u64, most: u64, side: f64) -> (Vec<[f32; 3]>, Offsets, Vec<f32>) {
+    /// Curly hairs of 0 to `most` points, their roots in a square of the given side, links of about half `step`.
+    fn groom(hairs: u64, most: u64, side: f64, step: f64) -> (Vec<[f32; 3]>, Offsets, Vec<f32>) {
         let count = |s: u64| if s.is_multiple_of(17) { s as usize / 17 % 3 } else { (most - s % 5) as usize };
         let offsets = Offsets::from_counts((0..hairs).map(count));
         let (mut position, mut radius) = (Vec::new(), Vec::new());
@@ -319,7 +319,7 @@ mod tests {
             for k in 0..count(s) as u64 {
                 position.push(p.cast::<f32>().into());
                 radius.push((0.02 + 0.03 * rng::uniform(7, s, 1, k)) as f32);
-                p += Vec3::from_fn(|i, _| 0.4 * rng::uniform(7, s, 2 + k, i as u64) - 0.15);
+                p += Vec3::from_fn(|i, _| step * (rng::uniform(7, s, 2 + k, i as u64) - 0.375));
             }
         }
         (position, offsets, radius)
@@ -347,17 +347,22 @@ mod tests {
 
     #[test]
     fn pairs_are_those_of_all_links_with_all() {
-        let (position, offsets, radius) = groom(240, 14, 6.0);
-        for scale in [1.0, 1e6] {
-            // Far from the origin and large: what rounding takes must not lose a pair.
-            let far = |p: &[f32; 3]| p.map(|x| (x + 3.0) * scale);
+        // Runs of short links, parts of long ones; far from the origin and large: what rounding takes must not lose a pair.
+        for (long, scale) in [(false, 1.0), (false, 1e6), (true, 1.0), (true, 1e6)] {
+            let (position, offsets, radius) = if long { groom(400, 6, 3.0, 6.0) } else { groom(240, 14, 6.0, 0.4) };
+            // Long ones are packed densely, in a flat layer.
+            let flat = if long { 0.2 } else { 1.0 };
+            let far = |p: &[f32; 3]| [p[0], p[1], flat * p[2]].map(|x| (x + 3.0) * scale);
             let position: Vec<[f32; 3]> = position.iter().map(far).collect();
             let radius: Vec<f32> = radius.iter().map(|r| r * scale).collect();
             let chains = Chains::of_polylines(&position, &offsets, &radius).expect("chains");
+            let (links, cut) =
+                ((0..chains.len()).map(|s| chains.links(s)).sum::<usize>(), Tree::new(&chains).stretch.len());
+            assert!(if long { 10 * cut > 13 * links } else { cut < links }, "{cut} of {links}");
             let all = brute(&chains, f64::from(scale));
             for margin in [0.0, -0.03, 0.1, 0.8].map(|m| m * f64::from(scale)) {
                 let want: Vec<Pair> = all.iter().filter(|p| p.gap <= margin).copied().collect();
-                assert!(want.len() > 50 && want.len() < 20_000, "{}", want.len());
+                assert!(want.len() > 30 && want.len() < 25_000, "{}", want.len());
                 assert_eq!(near_pairs(&chains, margin), want, "{margin}");
                 for p in want.iter().step_by(31) {
                     assert_eq!(nearest(&chains, p.hair), Some(*p));
@@ -371,7 +376,7 @@ mod tests {
 
     #[test]
     fn pairs_do_not_depend_on_threads() {
-        let (position, offsets, radius) = groom(400, 10, 5.0);
+        let (position, offsets, radius) = groom(400, 10, 5.0, 0.4);
         let chains = Chains::of_polylines(&position, &offsets, &radius).expect("chains");
         let with = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
@@ -383,7 +388,7 @@ mod tests {
 
     #[test]
     fn a_check_counts_and_lists_the_worst() {
-        let (position, offsets, radius) = groom(200, 12, 5.0);
+        let (position, offsets, radius) = groom(200, 12, 5.0, 0.4);
         let chains = Chains::of_polylines(&position, &offsets, &radius).expect("chains");
         let mut all = brute(&chains, 0.05);
         let report = check(&chains, 0.05, 10).expect("a report");
