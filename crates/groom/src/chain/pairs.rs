@@ -15,6 +15,9 @@ use std::ops::Range;
 /// takes 1.7 times as long.
 const STRETCH: f64 = 4.0;
 
+/// Links a stretch holds at most: all of them are compared where two stretches are near. Speed alone depends on it.
+const RUN: usize = 4;
+
 /// Stretches there may be for each link at most. Memory and speed depend on it.
 const PARTS: f64 = 4.0;
 
@@ -99,7 +102,7 @@ pub fn near_pairs(chains: &Chains, margin: f64) -> Vec<Pair> {
 /// Nearest place of two hairs of `chains`; `None` if one of them has no links.
 pub fn nearest(chains: &Chains, hair: [u32; 2]) -> Option<Pair> {
     let mut best: Option<Pair> = None;
-    let both = hair.map(|s| stretches(chains, s, f64::MAX, 4));
+    let both = hair.map(|s| stretches(chains, s, f64::MAX, RUN));
     for (a, b) in both[0].iter().flat_map(|a| both[1].iter().map(move |b| (a, b))) {
         let limit = best.map_or(f64::MAX, |p| p.gap);
         compare(chains, a, b, limit, &mut |p| best = nearer(best, p));
@@ -240,7 +243,7 @@ struct Tree<'a> {
 impl<'a> Tree<'a> {
     fn new(chains: &'a Chains) -> Self {
         let length = stretch_length(chains);
-        let cut = |s: u32| stretches(chains, s, length, usize::MAX);
+        let cut = |s: u32| stretches(chains, s, length, RUN);
         let mut stretch = (0..chains.len() as u32).into_par_iter().map(cut).collect::<Vec<_>>().concat();
         let mut node = Vec::new();
         if !stretch.is_empty() {
