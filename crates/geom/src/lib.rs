@@ -8,6 +8,7 @@ pub mod curve;
 pub mod map;
 pub mod mesh;
 pub mod motion;
+pub mod nurbs;
 pub mod pose;
 pub mod registers;
 #[cfg(test)]

@@ -5,6 +5,7 @@ mod area_curve;
 pub mod areas;
 mod box_tree;
 pub mod candidates;
+pub mod chain;
 mod chart_cut;
 pub mod cluster;
 pub mod comb;
