@@ -61,7 +61,7 @@ impl Runner<'_> {
         }
         let [asleep, frames] = simulate::SKIPPED.map(|name| of(Stage::Simulate, name));
         let saved = known(Stage::Simulate) * asleep as f64 / frames.saturating_sub(asleep).max(1) as f64;
-        let error = "a micrometre; in contact a few hundredths of a millimetre";
+        let error = "a micrometre; in contact up to a tenth of a millimetre";
         out.push(Skipped::new("simulate", "hairs asleep, times frames", asleep, frames, Some(saved), error));
         let (plain, simulated) = (of(Stage::Simulate, simulate::UNTWISTED), of(Stage::Simulate, "simulated"));
         let saved = known(Stage::Simulate) * TWIST * plain as f64 / simulated.max(1) as f64;
