@@ -460,20 +460,18 @@ mod tests {
         let (s, before) = groomed();
         let skin = s.skin();
         let frame = |h: usize| skin.frame(&before.root[h]);
-        let tips: Vec<Vec3> =
-            (0..before.len()).map(|h| *world_points(&frame(h), before.hair(h)).last().unwrap()).collect();
         // Through the middle of all hair, across the normal of the first.
-        let (point, normal) = (tips[0] - frame(0).n * 1.2, frame(0).n);
+        let tip = |hairs: &ControlHairs, h: usize| *world_points(&frame(h), hairs.hair(h)).last().unwrap();
+        let (point, normal) = (tip(&before, 0) - frame(0).n * 1.2, frame(0).n);
         let shear = Shear::Cut { plane: Plane { point, normal } };
         let mut hairs = before.clone();
         let counts = comb(&skin, &[], &[op(CombKind::Cut { shear: &shear, scalp: None })], &mut hairs);
         assert!(counts[0].combed > 0);
         for h in 0..before.len() {
             let (old, new) = (before.length(h), hairs.length(h));
-            let tip = *world_points(&frame(h), hairs.hair(h)).last().unwrap();
-            let crosses = (frame(h).origin - point).dot(&normal) <= 0.0 && (tips[h] - point).dot(&normal) > 0.0;
+            let crosses = (frame(h).origin - point).dot(&normal) <= 0.0 && (tip(&before, h) - point).dot(&normal) > 0.0;
             if crosses {
-                assert!((tip - point).dot(&normal).abs() < 1e-5 && new < old, "{h}");
+                assert!((tip(&hairs, h) - point).dot(&normal).abs() < 1e-5 && new < old, "{h}");
                 assert_eq!(hairs.cut[h], new as f32);
             } else if (frame(h).origin - point).dot(&normal) <= 0.0 {
                 assert_eq!((hairs.hair(h), hairs.cut[h]), (before.hair(h), f32::INFINITY));

@@ -125,13 +125,14 @@ pub(super) fn study(bench: &mut Bench<'_>, findings: &mut Findings) -> Result<()
     }
     let off = s.rows.iter().map(|(_, v)| (0.5 * (v[0] + v[1]) - 1.0).abs()).fold(0.0, f64::max);
     findings.sections.push(s);
-    let at_default = |model| {
-        let fits = |r: &&Row| r.at.model == model && r.at.steps == 8 && r.variant == "friction=0.3";
-        rows.iter().find(fits).map_or(f64::NAN, |r| 100.0 * r.error)
+    let at_default = |model: Model| {
+        let rows = rows.iter().filter(|r| r.at.model == model && r.at.steps == 8);
+        let each: Vec<String> = rows.map(|r| format!("{:.1} % ({})", 100.0 * r.error, r.variant)).collect();
+        each.join(", ")
     };
     findings.answers.push(format!(
-        "Friction: at the default step the way down an incline is wrong by {:.2} % (springs {:.2} %); a string over a drum slips \
-         within {:.1} % of the capstan's threshold.",
+        "Friction: at the default step the way down an incline is wrong by {} with the rod, by {} with springs; a string over a drum \
+         slips within {:.1} % of the capstan's threshold.",
         at_default(Model::Rod),
         at_default(Model::Springs),
         100.0 * off
