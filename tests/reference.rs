@@ -58,8 +58,8 @@ fn kind(root: &Value, v: &Value) -> String {
     }
 }
 
-/// One section per table, depth first.
-fn section(root: &Value, v: &Value, name: &str, out: &mut String) {
+/// One section per table, depth first; a table in itself is not said again. `above`: the tables that this one stands in.
+fn section<'a>(root: &'a Value, v: &'a Value, name: &str, above: &[&'a Value], out: &mut String) {
     let Some(properties) = v["properties"].as_object() else { return };
     let required: Vec<&str> = v["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
     if !name.is_empty() {
@@ -73,10 +73,11 @@ fn section(root: &Value, v: &Value, name: &str, out: &mut String) {
     }
     for (key, p) in properties {
         let table = target(root, p);
-        if table["properties"].is_object() {
+        let inside = [above, &[v]].concat();
+        if table["properties"].is_object() && !inside.iter().any(|t| std::ptr::eq(*t, table)) {
             let inner = if name.is_empty() { key.clone() } else { format!("{name}.{key}") };
             let brackets = if is_list(root, p) { "[]" } else { "" };
-            section(root, table, &format!("{inner}{brackets}"), out);
+            section(root, table, &format!("{inner}{brackets}"), &inside, out);
         }
     }
 }
@@ -91,7 +92,7 @@ fn reference() -> String {
     {
         let root: Value = serde_json::from_str(&text).expect("a schema is JSON");
         writeln!(out, "\n## {title}\n\n{}", root["description"].as_str().unwrap_or("")).expect("text");
-        section(&root, &root, "", &mut out);
+        section(&root, &root, "", &[], &mut out);
     }
     out
 }

@@ -2,7 +2,7 @@
 
 use super::Panel;
 use pelage_geom::{Mesh, Vec3};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// How far panels lie under the skin, in edges of the cells: flatter than this a skin is within a cell. At 0 half of a coarse
 /// mesh lies above the skin, and roots in the flow of the inside; at 1 thin parts (ears) vanish.
@@ -52,17 +52,29 @@ fn clustered(mesh: &Mesh, normal: &[Vec3], low: [f64; 3], cell: f64) -> Mesh {
     let under = |(at, up, count): &(Vec3, Vec3, f64)| {
         (at / *count - up.try_normalize(1e-6).unwrap_or_default() * (UNDER * cell)).into()
     };
-    let mut seen = BTreeSet::new();
-    let mut triangle = Vec::new();
+    // The same three from both sides are a sheet without an inside: no wall.
+    let mut sides: BTreeMap<[u32; 3], i32> = BTreeMap::new();
     for t in &mesh.triangle {
-        let t = t.map(|v| cluster[v as usize]);
-        let mut sorted = t;
-        sorted.sort_unstable();
-        // The same three from both sides are a sheet without an inside: neither is a wall.
-        if sorted[0] != sorted[1] && sorted[1] != sorted[2] && seen.insert(sorted) {
-            triangle.push(t);
+        let [a, b, c] = t.map(|v| cluster[v as usize]);
+        // The same way round, from the least on.
+        let first = if a < b && a < c {
+            [a, b, c]
+        } else if b < c {
+            [b, c, a]
+        } else {
+            [c, a, b]
+        };
+        let [a, b, c] = first;
+        if a != b && b != c && a != c {
+            if b < c { *sides.entry([a, b, c]).or_default() += 1 } else { *sides.entry([a, c, b]).or_default() -= 1 }
         }
     }
+    let turned = |(&[a, b, c], n): (&[u32; 3], &i32)| match n.signum() {
+        0 => None,
+        1 => Some([a, b, c]),
+        _ => Some([a, c, b]),
+    };
+    let mut triangle: Vec<[u32; 3]> = sides.iter().filter_map(turned).collect();
     let position: Vec<[f64; 3]> = sum.iter().map(under).collect();
     triangle.retain(|t| Panel::new(pelage_geom::mesh::corners(&position, *t)).is_some());
     Mesh { position, triangle, ..Mesh::default() }
