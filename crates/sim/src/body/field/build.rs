@@ -41,8 +41,8 @@ pub struct Known<'a> {
 }
 
 impl<'a> Known<'a> {
-    /// `field` of the triangles at the positions `before`, most of which (at least [`WORTHWHILE`]) are within [`SAME`] of where
-    /// they are `now`; otherwise nothing, as there is little to gain.
+    /// `field` of the triangles at the positions `before` (metres), a quarter of which at least are `now` where they were, to a
+    /// nanometre; otherwise nothing, as there is little to gain.
     pub fn new(field: &'a Field, triangle: &[[u32; 3]], before: &[[f64; 3]], now: &[[f64; 3]]) -> Option<Self> {
         let same = |v: &u32| {
             let (a, b) = (before[*v as usize], now[*v as usize]);
