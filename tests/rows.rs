@@ -198,6 +198,11 @@ fn what_hair_follows_and_where_it_is_cut_combs_again() {
     shot.edit(GROOM, "strength = 2.0", "strength = -2.0");
     expect(&shot, &combed, &["grooms/ball.toml: comb[1].primitive[0].strength 2.0 -> -2.0"]);
     assert!(hairs(&shot) != before, "hair turns round");
+    // Lines keep the clearance, whether hair is pushed up or not.
+    shot.edit(GROOM, "points = 6\n", "points = 6\npush_up = false\nclearance = 0.5\n");
+    shot.report(&[]);
+    shot.edit(GROOM, "clearance = 0.5", "clearance = 40.0");
+    expect(&shot, &combed, &["grooms/ball.toml: control.clearance 0.5 -> 40"]);
     shot.edit(
         GROOM,
         "[[layer]]",

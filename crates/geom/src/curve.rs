@@ -106,16 +106,21 @@ fn by_arc_length(points: &[Vec3], total: f64, n: usize) -> Vec<Vec3> {
     out
 }
 
+/// Place on a segment nearest to `q`, from 0 to 1; 0 if the segment has no length.
+pub fn foot(q: Vec3, segment: [Vec3; 2]) -> f64 {
+    let side = segment[1] - segment[0];
+    let square = side.norm_squared();
+    if square > 0.0 { (side.dot(&(q - segment[0])) / square).clamp(0.0, 1.0) } else { 0.0 }
+}
+
 /// Closest point of a polyline: segment, parameter along it in [0, 1], position, distance. Ties go to the first
 /// segment. A single point is segment 0 at 0; no point is infinitely far.
 pub fn closest_on_polyline(points: &[Vec3], q: Vec3) -> (usize, f64, Vec3, f64) {
     let Some(&first) = points.first() else { return (0, 0.0, q, f64::INFINITY) };
     let mut best = (0, 0.0, first, (q - first).norm_squared());
     for (k, w) in points.windows(2).enumerate() {
-        let side = w[1] - w[0];
-        let square = side.norm_squared();
-        let t = if square > 0.0 { (side.dot(&(q - w[0])) / square).clamp(0.0, 1.0) } else { 0.0 };
-        let p = if t == 1.0 { w[1] } else { w[0] + side * t };
+        let t = foot(q, [w[0], w[1]]);
+        let p = if t == 1.0 { w[1] } else { w[0] + (w[1] - w[0]) * t };
         let d = (q - p).norm_squared();
         if d < best.3 {
             best = (k, t, p, d);

@@ -65,7 +65,7 @@ impl ControlHairs {
 
     /// Sum of the segment lengths of hair `h`, scene units.
     pub fn length(&self, h: usize) -> f64 {
-        self.hair(h).windows(2).map(|w| (vec3(w[1]) - vec3(w[0])).norm()).sum()
+        pelage_geom::curve::length(self.hair(h))
     }
 
     /// Points of hair `h` in the space of `frame`, the frame of its root in some pose.

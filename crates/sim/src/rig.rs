@@ -1,11 +1,11 @@
 //! A few hairs with everything prescribed: for tests, stress and studies.
 
 use crate::{
-    Body, End, Field, FieldSettings, Hairs, Material, Model, Motion, Rigid, Root, Settings, SimError, Simulation, Span,
-    SpanReport, Started, Vec3, Wind,
+    Body, Ellipsoid, End, Field, FieldSettings, Hairs, Material, Model, Motion, Part, Rigid, Root, Settings, Shape,
+    SimError, Simulation, Span, SpanReport, Started, Vec3, Wind,
 };
 use pelage_geom::{Bvh, Mesh, Offsets, StrandId, Topology, shapes};
-use std::f64::consts::FRAC_PI_4;
+use std::f64::consts::{FRAC_PI_4, PI};
 
 /// Seconds of a frame.
 pub const FRAME: f64 = 1.0 / 24.0;
@@ -109,7 +109,7 @@ pub fn ball(radius: f64) -> Ball {
     let mesh = shapes::cube_sphere(48, radius);
     let topology = Topology::new(&mesh);
     let bvh = Bvh::build(&mesh.position, &mesh.triangle, &topology);
-    let field = Field::build(&mesh.position, &mesh.triangle, &topology, &bvh, &FieldSettings::default(), None);
+    let field = Field::build(&mesh.position, &mesh.triangle, &topology, &bvh, &FieldSettings::default(), None, None);
     Ball { mesh, bvh, field }
 }
 
@@ -133,6 +133,52 @@ pub fn tuft(radius: f64, count: usize, length: f64, points: usize) -> Vec<Vec<[f
                 .collect()
         })
         .collect()
+}
+
+/// How far the far end of a string falls in six film frames, metres, that hangs over a drum (a cylinder about z of some
+/// `radius`), `near` of it on one side and `far` on the other. Gravity comes in twelve frames before: a string that is dropped
+/// bounces, and slips early.
+pub fn fall_over_drum(
+    settings: &Settings,
+    segments: usize,
+    radius: f64,
+    [near, far]: [f64; 2],
+) -> Result<f64, SimError> {
+    // So long that its ends don't matter.
+    let drum = Ellipsoid { placement: Rigid::default(), semi_axes: [radius, radius, 1e3 * radius] };
+    let part = Part { motion: &still, shape: Shape::Ellipsoid(&drum), exact: None };
+    let body = Body { parts: vec![part], seconds: FRAME };
+    let r = radius + settings.offset;
+    let total = near + PI * r + far;
+    let at = |i: usize| {
+        let s = total * i as f64 / segments as f64;
+        let a = ((s - near) / r).clamp(0.0, PI);
+        let hangs = if s < near { s - near } else { (near + PI * r - s).min(0.0) };
+        [-r * libm::cos(a), r * libm::sin(a) + hangs, 0.0]
+    };
+    let mut rig = Rig::under(&[(0..=segments).map(at).collect()], settings, GRAVITY)?;
+    for k in 1..=12 {
+        rig.gravity = GRAVITY.map(|g| g * (f64::from(k) / 10.0).min(1.0));
+        rig.go(FRAME, &still, &body, None)?;
+    }
+    let start = rig.tip(0).y;
+    (0..6).try_for_each(|_| rig.go(FRAME, &still, &body, None))?;
+    Ok(start - rig.tip(0).y)
+}
+
+/// A hair that is held nowhere, in a vacuum, with friction; metres that it keeps from a body.
+pub fn loose(model: Model, friction: f64, offset: f64) -> Settings {
+    Settings {
+        model,
+        material: in_vacuum(),
+        root: End::Free,
+        tip: End::Free,
+        sag_free: false,
+        friction,
+        offset,
+        sleep: false,
+        ..Settings::default()
+    }
 }
 
 /// Hairs in a simulation, with the ends where they were groomed until they are carried elsewhere.

@@ -1,6 +1,7 @@
 //! How near two segments come.
 
 use pelage_geom::Vec3;
+use pelage_geom::curve::foot;
 
 /// Segments whose angle's sine is below this get their ends compared as well, for where they are parallel the place of
 /// closest approach is rounding noise. At 1e-6 its error is 1e-10 of a length. Below 1e-15 noise would be believed;
@@ -15,13 +16,6 @@ pub struct Approach {
     /// Places of it, from 0 (first end) to 1 on each segment. Where segments are parallel and lie beside each other
     /// there are many, and this is one of them.
     pub at: [f64; 2],
-}
-
-/// The place on segment `s` nearest to `p`, from 0 to 1; 0 if the segment has no length.
-pub fn foot(p: Vec3, s: [Vec3; 2]) -> f64 {
-    let along = s[1] - s[0];
-    let square = along.norm_squared();
-    if square > 0.0 { ((p - s[0]).dot(&along) / square).clamp(0.0, 1.0) } else { 0.0 }
 }
 
 /// Distance from `p` to segment `s`.

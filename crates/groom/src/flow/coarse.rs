@@ -1,6 +1,7 @@
 //! Panels for a skin: a coarse mesh just under it.
 
 use super::Panel;
+use crate::control::vec3;
 use pelage_geom::{Mesh, Vec3};
 use std::collections::BTreeMap;
 
@@ -14,7 +15,7 @@ const HALVINGS: usize = 24;
 /// A mesh of at most so many triangles a little under another, by clustering its vertices in cubic cells (Rossignac, Borrel 1993,
 /// "Multi-resolution 3D approximations for rendering complex scenes"): vertices of a cell become their mean. A mesh with no more
 /// triangles keeps them all. `normal`: outward unit normals of the vertices.
-pub fn coarse(mesh: &Mesh, normal: &[Vec3], at_most: usize) -> Mesh {
+pub fn coarse(mesh: &Mesh, normal: &[[f32; 3]], at_most: usize) -> Mesh {
     let (low, high) = mesh.bounds();
     let largest = (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max);
     if mesh.triangle.len() <= at_most || !(largest > 0.0 && largest.is_finite()) {
@@ -29,7 +30,7 @@ pub fn coarse(mesh: &Mesh, normal: &[Vec3], at_most: usize) -> Mesh {
     clustered(mesh, normal, low, rough)
 }
 
-fn clustered(mesh: &Mesh, normal: &[Vec3], low: [f64; 3], cell: f64) -> Mesh {
+fn clustered(mesh: &Mesh, normal: &[[f32; 3]], low: [f64; 3], cell: f64) -> Mesh {
     let mut number: BTreeMap<[i64; 3], u32> = BTreeMap::new();
     let mut sum: Vec<(Vec3, Vec3, f64)> = Vec::new();
     let cluster: Vec<u32> = mesh
@@ -44,7 +45,7 @@ fn clustered(mesh: &Mesh, normal: &[Vec3], low: [f64; 3], cell: f64) -> Mesh {
             });
             let (at, up, count) = &mut sum[k as usize];
             *at += Vec3::from(*p);
-            *up += n;
+            *up += vec3(*n);
             *count += 1.0;
             k
         })
@@ -88,7 +89,7 @@ mod tests {
     #[test]
     fn a_coarse_ball_lies_under_the_ball_and_has_few_panels() {
         let ball = shapes::cube_sphere(24, 10.0);
-        let normal: Vec<Vec3> = ball.position.iter().map(|p| Vec3::from(*p).normalize()).collect();
+        let normal: Vec<[f32; 3]> = ball.position.iter().map(|p| p.map(|x| (0.1 * x) as f32)).collect();
         let few = coarse(&ball, &normal, 500);
         assert!((250..=500).contains(&few.triangle.len()), "{}", few.triangle.len());
         for p in &few.position {

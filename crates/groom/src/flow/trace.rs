@@ -4,6 +4,7 @@
 //! with the field's directions at both. Points are laid off on it with a pair of compasses: all chords of a line are
 //! equal (to rounding) and add up to the length that was asked for, as hair that does not stretch needs it.
 
+use crate::spline::hermite;
 use pelage_geom::{Bvh, Vec3};
 use rayon::prelude::*;
 
@@ -176,9 +177,7 @@ struct Arc {
 
 impl Arc {
     fn at(&self, t: f64) -> Vec3 {
-        let u = 1.0 - t;
-        (self.ends[0] * (1.0 + 2.0 * t) + self.tangents[0] * t) * (u * u)
-            + (self.ends[1] * (1.0 + 2.0 * u) - self.tangents[1] * u) * (t * t)
+        hermite(self.ends[0], self.tangents[0], self.ends[1], self.tangents[1], t)
     }
 
     /// First place beyond `t` at a distance from a point that is nearer at `t` and not at the end: regula falsi,

@@ -117,7 +117,7 @@ impl Body {
     fn field(&self, pose: &Pose, spacing: f64) -> Field {
         let settings = FieldSettings { voxel: spacing * 1e-3, ..FieldSettings::default() };
         let (triangle, topology) = (&self.solid.mesh.triangle, &self.solid.topology);
-        Field::build(&pose.position, triangle, topology, &pose.bvh, &settings, None)
+        Field::build(&pose.position, triangle, topology, &pose.bvh, &settings, None, None)
     }
 
     /// A table around the middle of the scalp, or around the upright line through it.

@@ -1,8 +1,9 @@
 //! Combing along fields: vector fields, and flow around a body.
 
 use super::GroomFile;
+use super::comb::{Comb, one};
 use super::document::{ConfigError, Document, exactly, some_exactly};
-use super::groom::{Comb, CombKind, Feature, some_points};
+use super::groom::{Feature, some_points};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -55,10 +56,6 @@ pub struct Primitive {
     /// Acts on hair on the other side of dividers too. Default: false.
     #[serde(default)]
     pub across: bool,
-}
-
-fn one() -> f64 {
-    1.0
 }
 
 fn ones() -> [f64; 3] {
@@ -230,22 +227,8 @@ fn nothing() -> Feature {
 }
 
 impl Document<GroomFile> {
-    /// Checks keys of fields and flows.
+    /// Checks what fields, flows and cuts say.
     pub(super) fn check_guides(&self, key: &str, c: &Comb) -> Result<(), ConfigError> {
-        let (field, flow, cut) = (c.kind == CombKind::Field, c.kind == CombKind::Flow, c.kind == CombKind::Cut);
-        self.keys(
-            key,
-            &[
-                ("primitive", !c.primitive.is_empty(), field),
-                ("divider", !c.divider.is_empty(), field && !c.divider.is_empty()),
-                // A body that lets something through is a flow by itself.
-                ("element", !c.element.is_empty(), flow && (!c.element.is_empty() || c.panels.is_none())),
-                ("panels", c.panels.is_some(), flow && c.panels.is_some()),
-                ("reverse", c.reverse, flow && c.reverse),
-                ("shear", c.shear.is_some(), cut),
-                ("scalp", c.scalp.is_some(), cut && c.scalp.is_some()),
-            ],
-        )?;
         if let Some(s) = &c.shear {
             self.check_shear(&format!("{key}.shear"), s)?;
         }
@@ -273,7 +256,7 @@ impl Document<GroomFile> {
     }
 
     /// Each `(name, given, read)`: what is read must be given, and what is not must not.
-    fn keys(&self, key: &str, all: &[(&str, bool, bool)]) -> Result<(), ConfigError> {
+    pub(super) fn keys(&self, key: &str, all: &[(&str, bool, bool)]) -> Result<(), ConfigError> {
         for (name, given, read) in all {
             if *given && !read {
                 return Err(self.error(&format!("{key}.{name}"), "is not read by this kind", "take it out"));

@@ -1,5 +1,6 @@
 //! Shot and groom files: plain structs, read with their places in the text so that every complaint shows its line.
 
+mod comb;
 mod document;
 mod groom;
 mod guides;
@@ -13,12 +14,12 @@ mod shot;
 mod simulate;
 mod skip;
 
+pub use comb::{Comb, CombKind, Side, Space};
 pub use document::{ConfigError, Document};
 pub use groom::{
-    Channel, ColorFeature, Comb, CombKind, Control, Feature, GroomFile, Guard, Layer, MOST_POINTS, MapRef, Parting,
-    Placement,
+    Channel, ColorFeature, Control, Feature, GroomFile, Guard, Layer, MOST_POINTS, MapRef, Parting, Placement,
 };
-pub use groom::{Side, Space, WidthFeature, WrapMode};
+pub use groom::{WidthFeature, WrapMode};
 pub use guides::{Ball, Element, ElementKind, Falloff, Orientation, Panels, Plane, Primitive, Region, Shear};
 pub use keyed::{Amount, Key, Keyed, Vector};
 pub use light::{Light, LightKind, Shadow, ShadowQuality};

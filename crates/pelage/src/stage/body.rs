@@ -79,15 +79,11 @@ impl Surface {
         Surface { position, bvh }
     }
 
-    fn field(&self, solid: &Closed, settings: &FieldSettings, region: Option<Bounds>) -> Field {
-        Field::build(&self.position, &solid.mesh.triangle, &solid.topology, &self.bvh, settings, region)
-    }
-
-    /// The field of a solid that mostly lies where it did.
-    fn field_like(&self, before: &End, solid: &Closed, settings: &FieldSettings, region: Option<Bounds>) -> Field {
+    /// `before`: the solid in another pose, most of which may lie as it does.
+    fn field(&self, solid: &Closed, settings: &FieldSettings, region: Option<Bounds>, before: Option<&End>) -> Field {
         let triangle = &solid.mesh.triangle;
-        let known = Known::new(&before.field, triangle, &before.surface.position, &self.position);
-        Field::build_with(known, &self.position, triangle, &solid.topology, &self.bvh, settings, region)
+        let known = before.and_then(|b| Known::new(&b.field, triangle, &b.surface.position, &self.position));
+        Field::build(&self.position, triangle, &solid.topology, &self.bvh, settings, region, known)
     }
 }
 
@@ -140,12 +136,12 @@ pub(super) fn colliders(
             let solid = closed(run, "the skin", &skin.mesh, &skin.topology);
             if deforms {
                 let surface = Surface::new(&solid, &rest);
-                let field = surface.field(&solid, &settings, region);
+                let field = surface.field(&solid, &settings, region, None);
                 out.skin = Some((solid, End { surface, field }));
             } else {
                 let surface = Surface::new(&solid, &rest);
                 let stand = match b.kind {
-                    BodyKind::Field => Stand::Field(surface.field(&solid, &settings, region)),
+                    BodyKind::Field => Stand::Field(surface.field(&solid, &settings, region, None)),
                     BodyKind::Ellipsoid => Stand::Ellipsoid(ellipsoid(&solid, &surface)),
                     kind => Stand::Table(table(&surface, kind, in_metres(b.axis), up)),
                 };
@@ -160,7 +156,7 @@ pub(super) fn colliders(
         let solid = closed(run, &mesh.file.label, &read.mesh, &topology);
         let surface = Surface::new(&solid, &metres(&read.mesh.position, unit));
         let stand = match mesh.kind {
-            BodyKind::Field => Stand::Field(surface.field(&solid, &settings, None)),
+            BodyKind::Field => Stand::Field(surface.field(&solid, &settings, None, None)),
             BodyKind::Ellipsoid => Stand::Ellipsoid(ellipsoid(&solid, &surface).around(&surface.position)),
             kind => Stand::Table(table(&surface, kind, in_metres(mesh.axis), up)),
         };
@@ -239,7 +235,7 @@ impl Colliders {
         let local: Vec<[f64; 3]> = position.iter().map(|p| at.invert(Vec3::from(*p) * unit).into()).collect();
         let surface = Surface::new(skin, &local);
         // From the pose at rest, not the frame before: what a frame gives does not depend on where a run begins.
-        let field = surface.field_like(rest, skin, &self.settings, region);
+        let field = surface.field(skin, &self.settings, region, Some(rest));
         Some(Rc::new(End { surface, field }))
     }
 

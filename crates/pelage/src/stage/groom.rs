@@ -14,6 +14,7 @@ use pelage_geom::{Offsets, SurfacePoint, TiledMap, Vec3};
 use pelage_groom::candidates::candidates;
 use pelage_groom::comb::{CombKind, CombOp, DirectionSpace, Guides, comb};
 use pelage_groom::control::{self, ControlHairs, PartingPiece, Sites};
+use pelage_groom::field::lengths::Shear;
 use pelage_groom::flow::trace::{Guard, Start};
 use pelage_groom::place::{PlaceSettings, Placement, place};
 use pelage_groom::push_up::{PushUp, push_up};
@@ -213,31 +214,27 @@ fn comb_hairs(run: &mut Runner<'_>) -> Result<ControlHairs, Error> {
     let project = run.project;
     let lines = partings(run);
     let maps = comb_maps(run)?;
-    let clearance = project.groom.value.control.clearance * 1e-3 / project.shot.value.shot.meters_per_unit;
+    let control = &project.groom.value.control;
+    let millimetre = 1e-3 / project.shot.value.shot.meters_per_unit;
+    let clearance = control.clearance * millimetre;
     let guard = Guard { surface: skin.bvh(), clearance };
     let (guides, points) = (guides::guides(run)?, hairs.points);
     let trace: Vec<_> =
-        guides.iter().map(|g| g.as_ref().map(|g| (g, |starts: &[Start]| g.lines(points, &guard, starts)))).collect();
-    let ops: Vec<CombOp<'_>> = project
-        .groom
-        .value
-        .comb
+        guides.iter().map(|g| g.as_ref().map(|g| |starts: &[Start]| g.lines(points, &guard, starts))).collect();
+    let combs = &project.groom.value.comb;
+    let shears: Vec<Option<Shear>> = combs.iter().map(|c| c.shear.as_ref().map(guides::shear)).collect();
+    let ops: Vec<CombOp<'_>> = combs
         .iter()
-        .zip(&maps)
-        .zip(&trace)
-        .map(|((c, [region, map]), trace)| {
-            operation(run, c, region, map, trace.as_ref().map(|(g, trace)| (*g, Guides(trace))))
-        })
+        .enumerate()
+        .map(|(i, c)| operation(run, c, &maps[i], trace[i].as_ref().map(|t| Guides(t)), shears[i].as_ref()))
         .collect();
     let done = comb(&view(&skin), &lines, &ops, &mut hairs);
     let mut counts = Counts::from([
         ("control hairs combed".to_owned(), done.iter().map(|c| c.combed).max().unwrap_or(0) as u64),
         ("control hairs without a painted direction".to_owned(), done.iter().map(|c| c.unpainted as u64).sum()),
     ]);
-    let control = &project.groom.value.control;
     if control.push_up && control.clearance > 0.0 {
-        let millimetre = 1e-3 / project.shot.value.shot.meters_per_unit;
-        let settings = PushUp { step: millimetre, clearance: control.clearance * millimetre };
+        let settings = PushUp { step: millimetre, clearance };
         let pushed = push_up(&view(&skin), skin.bvh(), &settings, &mut hairs);
         for (name, n) in [
             ("control hairs pushed out of the skin", pushed.pushed),
@@ -265,9 +262,9 @@ fn comb_maps(run: &mut Runner<'_>) -> Result<Vec<[Option<TiledMap>; 2]>, Error> 
 fn operation<'a>(
     run: &Runner<'_>,
     c: &Comb,
-    region: &'a Option<TiledMap>,
-    map: &'a Option<TiledMap>,
-    guides: Option<(&'a guides::Guides, Guides<'a>)>,
+    [region, map]: &'a [Option<TiledMap>; 2],
+    guides: Option<Guides<'a>>,
+    shear: Option<&'a Shear>,
 ) -> CombOp<'a> {
     let curvature = c.curvature;
     let bend = c.bend.unwrap_or(1.0);
@@ -290,12 +287,10 @@ fn operation<'a>(
         },
         Kind::Bend => CombKind::Bend { angle: c.angle.unwrap_or(0.0), map: map.as_ref(), curvature },
         Kind::LayDown => CombKind::LayDown { amount: c.amount.unwrap_or(0.0), map: map.as_ref() },
-        Kind::Field | Kind::Flow => CombKind::Follow { guides: guides.expect("made for this kind").1, bend, curvature },
-        Kind::Cut => match guides {
-            Some((guides::Guides::Shear(shear), _)) => {
-                CombKind::Cut { shear, scalp: c.scalp.as_ref().map(guides::ball) }
-            }
-            _ => unreachable!("checked: a cut has its planes"),
+        Kind::Field | Kind::Flow => CombKind::Follow { guides: guides.expect("made for these kinds"), bend, curvature },
+        Kind::Cut => CombKind::Cut {
+            shear: shear.expect("checked: a cut has its planes"),
+            scalp: c.scalp.as_ref().map(guides::ball),
         },
         Kind::Length => CombKind::Length { value: c.value.unwrap_or(1.0), map: map.as_ref() },
     };

@@ -8,7 +8,7 @@ use crate::Error;
 use crate::config::{Ball, Comb, CombKind, Element, ElementKind, Orientation, Panels, Plane, Primitive, Region, Shear};
 use crate::format::ply;
 use nalgebra::UnitQuaternion;
-use pelage_geom::{Bvh, Mesh, TiledMap, Vec3, mesh};
+use pelage_geom::{Bvh, Mesh, Pose, TiledMap, Vec3};
 use pelage_groom::field::{self, Falloff, GuideField, lengths};
 use pelage_groom::flow::trace::{Guard, Lines, Start, Trace, trace};
 use pelage_groom::flow::{self, Body, Fast, Grid, OPENING, coarse};
@@ -23,11 +23,10 @@ const STEP: f64 = 0.25;
 /// Lines from which on a grid is worth filling.
 const MANY: usize = 2000;
 
-/// What an operation lets hairs follow, or where it cuts them.
+/// What an operation lets hairs follow.
 pub(super) enum Guides {
     Field(GuideField),
     Flow(Flow),
-    Shear(lengths::Shear),
 }
 
 /// A flow with its body solved.
@@ -37,14 +36,13 @@ pub(super) struct Flow {
     reverse: bool,
 }
 
-/// What the operations of a groom let hairs follow, or where they cut them; `None` for other operations.
+/// What the operations of a groom let hairs follow; `None` for those that follow nothing.
 pub(super) fn guides(run: &mut Runner<'_>) -> Result<Vec<Option<Guides>>, Error> {
     let project = run.project;
     let each = project.groom.value.comb.iter().enumerate();
     each.map(|(i, c)| match c.kind {
         CombKind::Field => Ok(Some(Guides::Field(field_of(c)))),
         CombKind::Flow => Ok(Some(Guides::Flow(flow_of(run, i, c)?))),
-        CombKind::Cut => Ok(c.shear.as_ref().map(|s| Guides::Shear(shear(s)))),
         _ => Ok(None),
     })
     .collect()
@@ -58,20 +56,19 @@ impl Guides {
         let settings = Trace { points, step, reverse: false, slow: 0.0 };
         match self {
             Guides::Field(field) => field.trace(starts, &settings, Some(guard)),
-            Guides::Shear(_) => Lines::default(),
-            Guides::Flow(f) => f.lines(&Trace { reverse: f.reverse, ..settings }, guard, starts),
+            Guides::Flow(f) => f.lines(&Trace { reverse: f.reverse, ..settings }, guard, starts, longest),
         }
     }
 }
 
 impl Flow {
-    fn lines(&self, settings: &Trace, guard: &Guard<'_>, starts: &[Start]) -> Lines {
+    /// Lines no longer than `reach`.
+    fn lines(&self, settings: &Trace, guard: &Guard<'_>, starts: &[Start], reach: f64) -> Lines {
         let Some((body, strength)) = &self.body else {
             let flow = flow::Flow { elements: &self.element, ..flow::Flow::default() };
             return trace(|_, p| flow.velocity(p), starts, settings, Some(guard));
         };
         let fast = Fast::new(body.flow(&self.element, strength), OPENING);
-        let reach = starts.iter().map(|s| s.length).fold(0.0, f64::max);
         let none = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
         let (low, high) = starts.iter().fold(none, |(low, high), s| (low.inf(&s.at), high.sup(&s.at)));
         let (low, high) = (low.add_scalar(-reach), high.add_scalar(reach));
@@ -166,7 +163,8 @@ fn plane(p: Option<Plane>) -> lengths::Plane {
     lengths::Plane { point: p.point.into(), normal: p.normal.into() }
 }
 
-fn shear(s: &Shear) -> lengths::Shear {
+/// Where an operation cuts.
+pub(super) fn shear(s: &Shear) -> lengths::Shear {
     match (&s.front, &s.back) {
         (Some(front), Some(back)) => {
             lengths::Shear::Part { plane: plane(s.part), front: Box::new(shear(front)), back: Box::new(shear(back)) }
@@ -202,10 +200,9 @@ fn body_of(run: &mut Runner<'_>, i: usize, p: &Panels, element: &[flow::Element]
     let panels = match run.project.panels.get(&i) {
         Some(file) => ply::read_mesh(&file.path)?.mesh,
         None => {
-            let closed = barrier(run)?;
-            let position = closed.closed.extend(&skin.mesh.position);
-            let whole = Mesh { position, triangle: closed.closed.mesh.triangle.clone(), ..Mesh::default() };
-            coarse(&whole, &normals(&whole), p.most)
+            let barrier = barrier(run)?;
+            let (whole, topology) = (&barrier.closed.mesh, &barrier.closed.topology);
+            coarse(whole, &Pose::new(whole, topology, whole.position.clone()).normal, p.most)
         }
     };
     let map = p.through.map().map(|m| run.map(&m, Texel::Value)).transpose()?;
@@ -224,14 +221,4 @@ fn body_of(run: &mut Runner<'_>, i: usize, p: &Panels, element: &[flow::Element]
 fn speed(skin: &Mesh, bvh: &Bvh, p: &Panels, map: Option<&TiledMap>, at: Vec3) -> f64 {
     let painted = map.zip(bvh.closest(at, f64::INFINITY)).map(|(map, near)| f64::from(map.value(skin.uv(&near.point))));
     p.through.value * painted.unwrap_or(1.0)
-}
-
-/// Unit normals of the vertices of a mesh, weighted by area.
-fn normals(whole: &Mesh) -> Vec<Vec3> {
-    let mut normal = vec![Vec3::zeros(); whole.position.len()];
-    for t in &whole.triangle {
-        let [a, b, c] = mesh::corners(&whole.position, *t);
-        t.iter().for_each(|v| normal[*v as usize] += (b - a).cross(&(c - a)));
-    }
-    normal.into_iter().map(|n| n.try_normalize(0.0).unwrap_or_default()).collect()
 }

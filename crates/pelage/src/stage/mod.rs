@@ -9,6 +9,7 @@ mod guides;
 mod kept;
 mod look;
 mod plan;
+mod plan_groom;
 mod plan_kept;
 mod plan_light;
 mod plan_look;

@@ -19,7 +19,7 @@ fn ball() -> (Field, Bvh) {
     let mesh = cube_sphere(32, 0.1);
     let topology = Topology::new(&mesh);
     let bvh = Bvh::build(&mesh.position, &mesh.triangle, &topology);
-    let field = Field::build(&mesh.position, &mesh.triangle, &topology, &bvh, &FieldSettings::default(), None);
+    let field = Field::build(&mesh.position, &mesh.triangle, &topology, &bvh, &FieldSettings::default(), None, None);
     (field, bvh)
 }
 

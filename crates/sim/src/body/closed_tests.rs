@@ -7,7 +7,7 @@ use pelage_geom::shapes::{bust, cube_sphere, plane};
 fn field(mesh: &Mesh, topology: &Topology) -> (Field, Bvh) {
     let bvh = Bvh::build(&mesh.position, &mesh.triangle, topology);
     let settings = FieldSettings { voxel: 0.004, outside: 0.02, inside: 0.01 };
-    (Field::build(&mesh.position, &mesh.triangle, topology, &bvh, &settings, None), bvh)
+    (Field::build(&mesh.position, &mesh.triangle, topology, &bvh, &settings, None, None), bvh)
 }
 
 /// A bust without what is below a height (metres), and the whole one.

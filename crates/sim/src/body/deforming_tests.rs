@@ -23,7 +23,7 @@ impl Frames {
         let settings = FieldSettings { voxel: VOXEL, outside: 0.02, inside: 0.01 };
         let field = [0, 1].map(|i| {
             let bvh = Bvh::build(&pose[i], &mesh.triangle, &topology);
-            Field::build(&pose[i], &mesh.triangle, &topology, &bvh, &settings, None)
+            Field::build(&pose[i], &mesh.triangle, &topology, &bvh, &settings, None, None)
         });
         let velocity: Vec<[f64; 3]> =
             pose[0].iter().zip(&pose[1]).map(|(a, b)| [0, 1, 2].map(|i| (b[i] - a[i]) / SECONDS)).collect();
@@ -163,7 +163,7 @@ fn a_frame_without_a_mesh_is_passed_over() {
     let bad = vec![[f64::NAN; 3]; frames.mesh.position.len()];
     let bvh = Bvh::build(&bad, &frames.mesh.triangle, &frames.topology);
     let settings = FieldSettings::default();
-    let lost = Field::build(&bad, &frames.mesh.triangle, &frames.topology, &bvh, &settings, None);
+    let lost = Field::build(&bad, &frames.mesh.triangle, &frames.topology, &bvh, &settings, None, None);
     frames.flow[1] = lost.flow(&frames.mesh.triangle, &bad);
     frames.field[1] = lost;
     let d = frames.deforming();

@@ -101,6 +101,8 @@ impl Field {
     /// The sign is that of [`Bvh::closest`]: points whose closest feature is an open border are outside, so that behind
     /// a rim the sign jumps somewhere in the open; [`super::Closed`] closes holes beforehand. Voxels are larger than
     /// asked where the lattice would be too large ([`Field::voxel`]). An empty mesh is infinitely far away.
+    ///
+    /// `known`: a field of the mesh in another pose; what is closer to the parts that lie as they did is taken from there.
     pub fn build(
         position: &[[f64; 3]],
         triangle: &[[u32; 3]],
@@ -108,19 +110,7 @@ impl Field {
         bvh: &Bvh,
         settings: &FieldSettings,
         region: Option<Bounds>,
-    ) -> Self {
-        Self::build_with(None, position, triangle, topology, bvh, settings, region)
-    }
-
-    /// The same; what is closer to the parts of the mesh that lie where they did in a `known` field is taken from there.
-    pub fn build_with(
         known: Option<Known<'_>>,
-        position: &[[f64; 3]],
-        triangle: &[[u32; 3]],
-        topology: &Topology,
-        bvh: &Bvh,
-        settings: &FieldSettings,
-        region: Option<Bounds>,
     ) -> Self {
         let mut field = Field {
             open_edges: topology.counts.open_edges,

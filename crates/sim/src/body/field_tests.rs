@@ -8,7 +8,7 @@ const FINE: FieldSettings = FieldSettings { voxel: 0.004, outside: 0.02, inside:
 fn with(mesh: &Mesh, settings: &FieldSettings, region: Option<Bounds>) -> (Field, Bvh) {
     let topology = Topology::new(mesh);
     let bvh = Bvh::build(&mesh.position, &mesh.triangle, &topology);
-    (Field::build(&mesh.position, &mesh.triangle, &topology, &bvh, settings, region), bvh)
+    (Field::build(&mesh.position, &mesh.triangle, &topology, &bvh, settings, region, None), bvh)
 }
 
 fn exact(bvh: &Bvh, p: Vec3) -> f64 {
@@ -206,7 +206,7 @@ fn odd_meshes_give_fields() {
     }
     let topology = Topology::new(&cube_sphere(16, 0.1));
     let bvh = Bvh::build(&mesh.position, &mesh.triangle, &topology);
-    let field = Field::build(&mesh.position, &mesh.triangle, &topology, &bvh, &FINE, None);
+    let field = Field::build(&mesh.position, &mesh.triangle, &topology, &bvh, &FINE, None, None);
     assert_eq!(field.not_finite, 3);
     let s = field.sample(Vec3::new(0.0, -0.105, 0.0));
     assert!((s.distance - 0.005).abs() < 0.001, "{s:?}");
@@ -252,16 +252,16 @@ fn a_field_like_a_known_one_is_what_it_would_be_by_itself() {
     let bvh = |position: &[[f64; 3]]| Bvh::build(position, &ball.triangle, &topology);
     let settings = FieldSettings::default();
     let at_rest = bvh(&ball.position);
-    let rest = Field::build(&ball.position, &ball.triangle, &topology, &at_rest, &settings, None);
+    let rest = Field::build(&ball.position, &ball.triangle, &topology, &at_rest, &settings, None, None);
     // One side swells; the lattice grows with it.
     let swollen: Vec<[f64; 3]> =
         ball.position.iter().map(|p| [p[0] + 4.0 * (p[0] - 0.05).max(0.0) * p[0], p[1], p[2]]).collect();
     let moved = bvh(&swollen);
     let region = Some(([-0.09, -0.2, -0.2], [0.2; 3]));
     for region in [None, region] {
-        let alone = Field::build(&swollen, &ball.triangle, &topology, &moved, &settings, region);
+        let alone = Field::build(&swollen, &ball.triangle, &topology, &moved, &settings, region, None);
         let known = Known::new(&rest, &ball.triangle, &ball.position, &swollen).expect("most of it stays");
-        let like = Field::build_with(Some(known), &swollen, &ball.triangle, &topology, &moved, &settings, region);
+        let like = Field::build(&swollen, &ball.triangle, &topology, &moved, &settings, region, Some(known));
         assert_eq!(like.cells, alone.cells);
         assert_eq!((&like.brick, &like.centre), (&alone.brick, &alone.centre));
         assert!(like.distance == alone.distance, "distances differ");
@@ -281,14 +281,14 @@ fn what_moved_closer_is_sampled_again() {
     let topology = Topology::new(&ball);
     let settings = FieldSettings::default();
     let at_rest = Bvh::build(&ball.position, &ball.triangle, &topology);
-    let rest = Field::build(&ball.position, &ball.triangle, &topology, &at_rest, &settings, None);
+    let rest = Field::build(&ball.position, &ball.triangle, &topology, &at_rest, &settings, None, None);
     // A thorn: one vertex moves far out.
     let mut thorn = ball.position.clone();
     let top = (0..thorn.len()).max_by(|a, b| thorn[*a][1].total_cmp(&thorn[*b][1])).unwrap();
     thorn[top][1] += 0.08;
     let bvh = Bvh::build(&thorn, &ball.triangle, &topology);
     let known = Known::new(&rest, &ball.triangle, &ball.position, &thorn).expect("most of it stays");
-    let like = Field::build_with(Some(known), &thorn, &ball.triangle, &topology, &bvh, &settings, None);
-    let alone = Field::build(&thorn, &ball.triangle, &topology, &bvh, &settings, None);
+    let like = Field::build(&thorn, &ball.triangle, &topology, &bvh, &settings, None, Some(known));
+    let alone = Field::build(&thorn, &ball.triangle, &topology, &bvh, &settings, None, None);
     assert!(like.distance == alone.distance && like.brick == alone.brick);
 }

@@ -100,6 +100,14 @@ pub fn capstan(friction: f64, angle: f64) -> f64 {
     libm::exp(friction * angle)
 }
 
+/// Length that hangs on the far side of a drum when a string of even weight w, `near` of which hangs on the other, just slips
+/// over half a turn: T' = mu (T + w R sin a) + w R cos a, of which w R ((1 - mu^2) sin a - 2 mu cos a) / (1 + mu^2) is one
+/// solution and [`capstan`] gives the others.
+pub fn slips_over_drum(near: f64, radius: f64, friction: f64) -> f64 {
+    let own = 2.0 * friction * radius / (1.0 + friction * friction);
+    capstan(friction, PI) * (near + own) + own
+}
+
 /// Acceleration down an incline over g: `sin a - mu cos a` from rest, 0 while `tan a <= mu`.
 pub fn incline(friction: f64, angle: f64) -> f64 {
     (libm::sin(angle) - friction * libm::cos(angle)).max(0.0)

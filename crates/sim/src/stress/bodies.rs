@@ -19,7 +19,7 @@ pub(super) fn ball(change: impl Fn(&mut Mesh)) -> Ball {
     change(&mut mesh);
     let topology = Topology::new(&mesh);
     let bvh = Bvh::build(&mesh.position, &mesh.triangle, &topology);
-    let field = Field::build(&mesh.position, &mesh.triangle, &topology, &bvh, &FieldSettings::default(), None);
+    let field = Field::build(&mesh.position, &mesh.triangle, &topology, &bvh, &FieldSettings::default(), None, None);
     Ball { mesh, bvh, field }
 }
 

@@ -163,7 +163,7 @@ fn bad_vertex(model: Model, m: &mut Measures, bad: f64) -> Done {
     let topology = Topology::new(&good.mesh);
     let built = |at: &[[f64; 3]]| {
         let bvh = Bvh::build(at, triangle, &topology);
-        let field = Field::build(at, triangle, &topology, &bvh, &FieldSettings::default(), None);
+        let field = Field::build(at, triangle, &topology, &bvh, &FieldSettings::default(), None, None);
         (bvh, field)
     };
     let mut rig = Rig::new(&hairs, &Settings { sag_free: false, ..settings(model) })?;

@@ -4,38 +4,15 @@ use super::{At, Case, Clock, Finer, HAIRS, Row, name, section, work_precision};
 use crate::Error;
 use crate::bench::{Bench, Findings, Section};
 use pelage_sim::reference::formula;
-use pelage_sim::rig::{G, GRAVITY, Rig, in_vacuum, still, straight};
-use pelage_sim::{Body, Ellipsoid, End, Material, Model, Part, Rigid, Settings, Shape, SimError, Vec3};
-use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_4, PI};
-
-/// A film frame, seconds.
-const FRAME: f64 = 1.0 / 24.0;
+use pelage_sim::rig::{FRAME, G, Rig, fall_over_drum, in_vacuum, loose, still, straight};
+use pelage_sim::{Body, Ellipsoid, Material, Model, Part, Rigid, Settings, Shape, SimError, Vec3};
+use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_4};
 
 /// Frames that hair slides for.
 const FRAMES: usize = 6;
 
 /// Distance that hair keeps from a body, metres.
 const OFFSET: f64 = 1e-4;
-
-/// A hair that is held nowhere.
-fn loose(model: Model, friction: f64) -> Settings {
-    Settings {
-        model,
-        material: in_vacuum(),
-        root: End::Free,
-        tip: End::Free,
-        sag_free: false,
-        friction,
-        offset: OFFSET,
-        sleep: false,
-        ..Settings::default()
-    }
-}
-
-fn body(ellipsoid: &Ellipsoid) -> Body<'_> {
-    let part = Part { motion: &still, shape: Shape::Ellipsoid(ellipsoid), exact: None };
-    Body { parts: vec![part], seconds: FRAME }
-}
 
 /// Way of a short hair down an incline of 45 degrees.
 fn incline(friction: f64, at: At, clock: &mut Clock) -> Result<[f64; 2], SimError> {
@@ -44,10 +21,12 @@ fn incline(friction: f64, at: At, clock: &mut Clock) -> Result<[f64; 2], SimErro
     let placement = Rigid { translation: [0.0, -radius, 0.0], ..Rigid::default() };
     let ground = Ellipsoid { placement, semi_axes: [radius; 3] };
     let hair: Vec<[f64; 3]> = straight(at.segments, Vec3::z()).iter().map(|p| [0.0, OFFSET, 0.01 * p[2]]).collect();
-    let settings = Settings { substeps: Some(at.steps), ..loose(at.model, friction) };
+    let settings = Settings { substeps: Some(at.steps), ..loose(at.model, friction, OFFSET) };
     let gravity = [G * FRAC_1_SQRT_2, -G * FRAC_1_SQRT_2, 0.0];
     let mut rig = Rig::under(&vec![hair; HAIRS], &settings, gravity)?;
-    clock.time(|| (0..FRAMES).try_for_each(|_| rig.go(FRAME, &still, &body(&ground), None)))?;
+    let part = Part { motion: &still, shape: Shape::Ellipsoid(&ground), exact: None };
+    let body = Body { parts: vec![part], seconds: FRAME };
+    clock.time(|| (0..FRAMES).try_for_each(|_| rig.go(FRAME, &still, &body, None)))?;
     let seconds = FRAME * FRAMES as f64;
     let exact = 0.5 * G * formula::incline(friction, FRAC_PI_4) * seconds * seconds;
     Ok([(rig.tip(0).x / exact - 1.0).abs(), f64::NAN])
@@ -57,38 +36,12 @@ fn incline(friction: f64, at: At, clock: &mut Clock) -> Result<[f64; 2], SimErro
 const DRUM: f64 = 0.01;
 const NEAR: f64 = 0.05;
 
-/// Length that hangs on the far side of the drum when a string of even weight w just slips. Over half a turn T' = mu (T + w R
-/// sin a) + w R cos a; with k = e^(mu pi): T = k (near + 2 mu R / (1 + mu^2) + ...), solved in closed form.
-fn slips_at(friction: f64) -> f64 {
-    let k = formula::capstan(friction, PI);
-    let square = friction * friction;
-    // Of T' = mu T + R (mu sin a + cos a) a particular solution is R ((1 - mu^2) sin a - 2 mu cos a) / (1 + mu^2).
-    k * (NEAR + 2.0 * friction * DRUM / (1.0 + square)) + 2.0 * friction * DRUM / (1.0 + square)
-}
-
 /// Whether a string over a drum slips when its far side is `factor` times as long as it may be.
 fn slips(model: Model, segments: usize, friction: f64, factor: f64) -> Result<bool, SimError> {
-    // Long enough that its ends don't matter: a cylinder about z.
-    let drum = Ellipsoid { placement: Rigid::default(), semi_axes: [DRUM, DRUM, 1e3 * DRUM] };
-    let (r, far) = (DRUM + OFFSET, slips_at(friction) * factor);
-    let total = NEAR + PI * r + far;
-    let at = |i: usize| {
-        let s = total * i as f64 / segments as f64;
-        let a = ((s - NEAR) / r).clamp(0.0, PI);
-        let hangs = if s < NEAR { s - NEAR } else { (NEAR + PI * r - s).min(0.0) };
-        [-r * libm::cos(a), r * libm::sin(a) + hangs, 0.0]
-    };
-    let hair: Vec<[f64; 3]> = (0..=segments).map(at).collect();
+    let far = formula::slips_over_drum(NEAR, DRUM, friction) * factor;
     let soft = Material { bend_factor: 1e-3, twist_factor: 1e-3, ..in_vacuum() };
-    let mut rig = Rig::under(&[hair], &Settings { material: soft, ..loose(model, friction) }, GRAVITY)?;
-    // Gravity comes slowly: a string that is dropped bounces, and slips early.
-    for k in 1..=12 {
-        rig.gravity = GRAVITY.map(|g| g * (f64::from(k) / 10.0).min(1.0));
-        rig.go(FRAME, &still, &body(&drum), None)?;
-    }
-    let start = rig.tip(0).y;
-    (0..6).try_for_each(|_| rig.go(FRAME, &still, &body(&drum), None))?;
-    Ok(start - rig.tip(0).y > 2e-4)
+    let settings = Settings { material: soft, ..loose(model, friction, OFFSET) };
+    Ok(fall_over_drum(&settings, segments, DRUM, [NEAR, far])? > 2e-4)
 }
 
 pub(super) fn study(bench: &mut Bench<'_>, findings: &mut Findings) -> Result<(), Error> {

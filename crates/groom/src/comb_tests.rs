@@ -1,0 +1,269 @@
+use super::*;
+use crate::place::{PlaceSettings, Placement, place};
+use crate::test_skin::TestSkin;
+use pelage_geom::{Map, Wrap};
+
+fn groomed() -> (TestSkin, ControlHairs) {
+    let s = TestSkin::new(24, 12, 0.5);
+    let settings = PlaceSettings {
+        placement: Placement::Grid { u: 5, v: 6 },
+        points: 6,
+        length: 3.0,
+        length_map: None,
+        partings: &[],
+        parting_spacing: 1.0,
+    };
+    let (hairs, _, _) = place(&s.skin(), &s.bvh, &settings);
+    (s, hairs)
+}
+
+fn op(kind: CombKind<'_>) -> CombOp<'_> {
+    CombOp { kind, weight: 1.0, region: None, side: None }
+}
+
+#[test]
+fn hair_that_follows_a_line_takes_its_shape_and_keeps_its_length() {
+    let (s, before) = groomed();
+    // Quarter circles in a tilted plane, each of its hair's length.
+    let arc = |starts: &[Start]| {
+        let points = before.points;
+        let at = starts.iter().flat_map(|start| {
+            let radius = start.length / std::f64::consts::FRAC_PI_2;
+            (0..points).map(move |k| {
+                let a = std::f64::consts::FRAC_PI_2 * k as f64 / (points - 1) as f64;
+                start.at + (Vec3::y() * libm::sin(a) + Vec3::new(0.6, 0.0, 0.8) * (1.0 - libm::cos(a))) * radius
+            })
+        });
+        Lines { points, at: at.collect(), straight_from: vec![points as u32; starts.len()] }
+    };
+    let follow = |bend| CombKind::Follow { guides: Guides(&arc), bend, curvature: 0.0 };
+    let mut whole = before.clone();
+    let counts = comb(&s.skin(), &[], &[op(follow(1.0))], &mut whole);
+    assert_eq!(counts[0].combed, before.len());
+    let skin = s.skin();
+    for h in 0..before.len() {
+        let frame = skin.frame(&before.root[h]);
+        let line = world_points(&frame, whole.hair(h));
+        let start = Start { at: frame.origin, direction: frame.n, length: before.length(h) };
+        let guide = arc(&[start]).at;
+        for (w, g) in line.windows(2).zip(guide.windows(2)) {
+            let (w, g) = (w[1] - w[0], g[1] - g[0]);
+            assert!(w.normalize().dot(&g.normalize()) > 1.0 - 1e-9, "{w} {g}");
+        }
+        assert!((whole.length(h) - before.length(h)).abs() < 1e-5);
+    }
+    let mut none = before.clone();
+    comb(&s.skin(), &[], &[op(follow(0.0))], &mut none);
+    assert_eq!(none, before);
+    let mut half = before.clone();
+    comb(&s.skin(), &[], &[op(follow(0.5))], &mut half);
+    assert!(half != before && half != whole);
+}
+
+#[test]
+fn cut_hair_ends_at_its_plane_and_is_never_longer() {
+    use crate::field::lengths::Plane;
+    let (s, before) = groomed();
+    let skin = s.skin();
+    let frame = |h: usize| skin.frame(&before.root[h]);
+    // Through the middle of all hair, across the normal of the first.
+    let tip = |hairs: &ControlHairs, h: usize| *world_points(&frame(h), hairs.hair(h)).last().unwrap();
+    let (point, normal) = (tip(&before, 0) - frame(0).n * 1.2, frame(0).n);
+    let shear = Shear::Cut { plane: Plane { point, normal } };
+    let mut hairs = before.clone();
+    let counts = comb(&skin, &[], &[op(CombKind::Cut { shear: &shear, scalp: None })], &mut hairs);
+    assert!(counts[0].combed > 0);
+    for h in 0..before.len() {
+        let (old, new) = (before.length(h), hairs.length(h));
+        let crosses = (frame(h).origin - point).dot(&normal) <= 0.0 && (tip(&before, h) - point).dot(&normal) > 0.0;
+        if crosses {
+            assert!((tip(&hairs, h) - point).dot(&normal).abs() < 1e-5 && new < old, "{h}");
+            assert_eq!(hairs.cut[h], new as f32);
+        } else if (frame(h).origin - point).dot(&normal) <= 0.0 {
+            assert_eq!((hairs.hair(h), hairs.cut[h]), (before.hair(h), f32::INFINITY));
+        }
+        assert!(new <= old * (1.0 + 1e-6));
+    }
+}
+
+fn curve(radius: f64, bend: f64, curvature: f64) -> CombKind<'static> {
+    let points = vec![Vec3::new(-20.0, 12.0, 0.0), Vec3::new(20.0, 12.0, 5.0)];
+    CombKind::DirectionCurve { points, radius, falloff: 0.5, bend, curvature }
+}
+
+fn flat(value: &[f32]) -> TiledMap {
+    let map = Map { width: 1, height: 1, channels: value.len(), data: value.to_vec() };
+    TiledMap { tiles: vec![(0, map)], wrap: Wrap::Clamp }
+}
+
+fn all_ops<'a>(rgb: &'a TiledMap, half: &'a TiledMap) -> Vec<CombOp<'a>> {
+    [
+        curve(f64::INFINITY, 0.7, 0.6),
+        CombKind::DirectionMap { map: rgb, space: DirectionSpace::Root, bend: 0.5, curvature: 0.3 },
+        CombKind::Bend { angle: 40.0, map: Some(half), curvature: 1.0 },
+        CombKind::LayDown { amount: 0.8, map: None },
+        CombKind::Length { value: 1.5, map: Some(half) },
+    ]
+    .into_iter()
+    .map(op)
+    .collect()
+}
+
+#[test]
+fn weight_zero_changes_no_byte() {
+    let (s, mut hairs) = groomed();
+    let (rgb, half, zero) = (flat(&[0.9, 0.7, 0.2]), flat(&[0.5]), flat(&[0.0]));
+    comb(&s.skin(), &[], &all_ops(&rgb, &half), &mut hairs);
+    let before = hairs.clone();
+    let mut ops = all_ops(&rgb, &half);
+    ops.iter_mut().for_each(|o| o.weight = 0.0);
+    let mut regions = all_ops(&rgb, &half);
+    regions.iter_mut().for_each(|o| o.region = Some(&zero));
+    ops.extend(regions);
+    ops.push(op(curve(0.5, 1.0, 0.0)));
+    let counts = comb(&s.skin(), &[], &ops, &mut hairs);
+    assert!(counts.iter().all(|c| c.combed == 0));
+    assert_eq!(before, hairs);
+}
+
+#[test]
+fn only_the_length_operation_changes_lengths() {
+    let (s, mut hairs) = groomed();
+    let (rgb, half) = (flat(&[0.9, 0.7, 0.2]), flat(&[0.5]));
+    for (i, o) in all_ops(&rgb, &half).into_iter().enumerate() {
+        let factor = if i == 4 { 0.75 } else { 1.0 };
+        let before = hairs.clone();
+        let counts = comb(&s.skin(), &[], &[o], &mut hairs);
+        assert_eq!(counts[0].combed, hairs.len());
+        assert_ne!(before, hairs);
+        for h in 0..hairs.len() {
+            assert!((hairs.length(h) - factor * before.length(h)).abs() < 1e-6 * 3.0);
+            assert_eq!(hairs.hair(h)[0], [0.0; 3]);
+        }
+    }
+}
+
+#[test]
+fn a_full_bend_without_curvature_aligns_with_the_curve() {
+    let (s, mut hairs) = groomed();
+    comb(&s.skin(), &[], &[op(curve(f64::INFINITY, 1.0, 0.0))], &mut hairs);
+    let target = Vec3::new(40.0, 0.0, 5.0).normalize();
+    for h in 0..hairs.len() {
+        let line = world_points(&s.skin().frame(&hairs.root[h]), hairs.hair(h));
+        for w in line.windows(2) {
+            assert!(((w[1] - w[0]).normalize() - target).norm() < 1e-5);
+        }
+    }
+}
+
+#[test]
+fn curvature_leaves_the_root_and_bends_the_tip() {
+    let (s, mut hairs) = groomed();
+    comb(&s.skin(), &[], &[op(curve(f64::INFINITY, 1.0, 1.0))], &mut hairs);
+    let target = Vec3::new(40.0, 0.0, 5.0).normalize();
+    for h in 0..hairs.len() {
+        let f = s.skin().frame(&hairs.root[h]);
+        let line = world_points(&f, hairs.hair(h));
+        let angle: Vec<f64> =
+            line.windows(2).map(|w| (w[1] - w[0]).normalize().dot(&target).min(1.0).acos_()).collect();
+        assert!(((line[1] - line[0]).normalize() - f.n).norm() < 1e-5);
+        assert!(angle[4] < 1e-3);
+        // Equal steps along the great circle.
+        for k in 0..5 {
+            assert!((angle[k] - angle[0] * (1.0 - k as f64 / 4.0)).abs() < 1e-3, "{angle:?}");
+        }
+    }
+}
+
+trait Acos {
+    fn acos_(self) -> f64;
+}
+impl Acos for f64 {
+    fn acos_(self) -> f64 {
+        libm::acos(self)
+    }
+}
+
+#[test]
+fn influence_ends_at_the_radius_and_fades_as_told() {
+    assert_eq!(influence(1e9, f64::INFINITY, 0.5), 1.0);
+    assert_eq!(influence(1.99, 2.0, 0.0), 1.0);
+    assert_eq!(influence(2.0, 2.0, 0.0), 0.0);
+    assert_eq!(influence(1.0, 2.0, 0.5), 1.0);
+    assert!((influence(1.5, 2.0, 0.5) - 0.5).abs() < 1e-12);
+    assert!((influence(1.0, 2.0, 1.0) - 0.5).abs() < 1e-12);
+}
+
+#[test]
+fn laying_down_keeps_the_azimuth_and_ends_near_the_tangent_plane() {
+    let (s, mut hairs) = groomed();
+    comb(&s.skin(), &[], &[op(curve(f64::INFINITY, 0.4, 0.5))], &mut hairs);
+    let before = hairs.clone();
+    comb(&s.skin(), &[], &[op(CombKind::LayDown { amount: 1.0, map: None })], &mut hairs);
+    for h in 0..hairs.len() {
+        for k in 0..5 {
+            let segment = |c: &ControlHairs| (vec3(c.hair(h)[k + 1]) - vec3(c.hair(h)[k])).normalize();
+            let (a, b) = (segment(&before), segment(&hairs));
+            assert!((b.x - libm::sin(FLAT_ELEVATION)).abs() < 1e-4);
+            assert!((a.y * b.z - a.z * b.y).abs() < 1e-4);
+        }
+    }
+}
+
+#[test]
+fn a_bend_turns_the_tip_by_its_angle() {
+    let (s, mut hairs) = groomed();
+    comb(&s.skin(), &[], &[op(CombKind::Bend { angle: 90.0, map: None, curvature: 1.0 })], &mut hairs);
+    for h in 0..hairs.len() {
+        let p = hairs.hair(h);
+        assert!((p[1][0] - 0.6).abs() < 1e-6 && (p[5][0] - p[4][0]).abs() < 1e-6 && p[5][1] - p[4][1] > 0.599);
+    }
+}
+
+#[test]
+fn painted_directions_are_read_in_their_space_and_grey_says_nothing() {
+    let (s, mut hairs) = groomed();
+    let upright = hairs.clone();
+    let grey = flat(&[128.0 / 255.0; 3]);
+    let map = |map, space| op(CombKind::DirectionMap { map, space, bend: 1.0, curvature: 0.0 });
+    let counts = comb(&s.skin(), &[], &[map(&grey, DirectionSpace::World)], &mut hairs);
+    assert_eq!((counts[0].unpainted, &hairs), (hairs.len(), &upright));
+    let along_z = flat(&[0.5, 0.5, 1.0]);
+    comb(&s.skin(), &[], &[map(&along_z, DirectionSpace::Root)], &mut hairs);
+    assert!((0..hairs.len()).all(|h| (vec3(hairs.hair(h)[5]) - Vec3::z() * 3.0).norm() < 1e-5));
+    comb(&s.skin(), &[], &[map(&along_z, DirectionSpace::World)], &mut hairs);
+    for h in 0..hairs.len() {
+        let line = world_points(&s.skin().frame(&hairs.root[h]), hairs.hair(h));
+        assert!((line[5] - line[0] - Vec3::z() * 3.0).norm() < 1e-5);
+    }
+}
+
+#[test]
+fn sides_of_a_parting() {
+    let line = [Vec3::new(0.0, 0.0, 0.0), Vec3::new(1.0, 0.0, 0.0), Vec3::new(1.0, 1.0, 0.0)];
+    let up = Vec3::z();
+    assert_eq!(side_of(&line, Vec3::new(0.5, 0.1, 0.3), up), 1);
+    assert_eq!(side_of(&line, Vec3::new(0.5, -0.1, 0.0), up), -1);
+    assert_eq!(side_of(&line, Vec3::new(0.9, 0.5, 0.0), up), 1);
+    assert_eq!(side_of(&line, Vec3::new(1.4, -0.3, 0.0), up), -1);
+    assert_eq!(side_of(&line, Vec3::new(0.5, 0.1, 0.3), -up), -1);
+    assert_eq!(side_of(&line, Vec3::new(0.5, 0.0, 0.0), up), 0);
+    let (s, mut hairs) = groomed();
+    let parting = vec![vec![Vec3::new(-10.0, 10.0, 0.0), Vec3::new(10.0, 10.0, 0.0)]];
+    let before = hairs.clone();
+    let left = CombOp { side: Some((0, 1)), ..op(curve(f64::INFINITY, 1.0, 0.0)) };
+    comb(&s.skin(), &parting, &[left], &mut hairs);
+    for h in 0..hairs.len() {
+        let f = s.skin().frame(&hairs.root[h]);
+        let side = side_of(&parting[0], f.origin, f.n);
+        assert_eq!(before.hair(h) == hairs.hair(h), side == -1, "{side}");
+    }
+}
+
+#[test]
+fn opposite_directions_turn_over_the_normal() {
+    let half = slerp(Vec3::y(), -Vec3::y(), 0.5);
+    assert!((half - Vec3::x()).norm() < 1e-12, "{half}");
+    assert!((slerp(Vec3::x(), -Vec3::x(), 1.0) + Vec3::x()).norm() < 1e-12);
+    assert!((slerp(Vec3::x(), Vec3::z(), 1.0) - Vec3::z()).norm() < 1e-12);
+}

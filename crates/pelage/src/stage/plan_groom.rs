@@ -1,0 +1,121 @@
+//! What control hairs read.
+
+use super::plan::{Reader, version};
+use crate::cache::Recipe;
+use crate::config::{Comb, CombKind, Parting};
+
+impl Reader<'_> {
+    /// What placing control hairs reads.
+    pub(super) fn place(&self) -> Recipe {
+        let control = &self.project.groom.value.control;
+        let mut r = self.unit(self.rest(Recipe::new("groom/place", version::PLACE)));
+        let p = &control.placement;
+        let at = self.in_groom("control.placement");
+        if let Some(d) = p.per_cm2 {
+            r = r.param("per_cm2", d, format!("{at}.per_cm2"));
+        }
+        if let Some([u, v]) = p.grid {
+            r = r.param("grid", format!("{u} x {v}"), format!("{at}.grid"));
+        }
+        if let Some(drawn) = &self.project.drawn {
+            r = r.file("curves", &drawn.hash, drawn.label.clone());
+        }
+        for (i, Parting { points, .. }) in self.project.groom.value.parting.iter().enumerate() {
+            r = r.param(
+                &format!("parting[{i}]"),
+                format!("{points:?}"),
+                self.in_groom(&format!("parting[{i}].points")),
+            );
+        }
+        r
+    }
+
+    /// What combing reads.
+    pub(super) fn comb(&self) -> Recipe {
+        let groom = &self.project.groom.value;
+        let mut r = self.unit(self.rest(Recipe::new("groom/comb", version::COMB)));
+        r = r.param("points", groom.control.points, self.in_groom("control.points"));
+        let (key, length) = self.project.control_length();
+        r = r.with(self.feature("length", &key, &length));
+        for (i, c) in groom.comb.iter().enumerate() {
+            r = self.comb_fields(r, i, c);
+        }
+        let control = &groom.control;
+        r = r.param("push_up", control.push_up, self.in_groom("control.push_up"));
+        // Lines that hair follows keep it too.
+        let follows = |c: &Comb| matches!(c.kind, CombKind::Field | CombKind::Flow);
+        if control.push_up || groom.comb.iter().any(follows) {
+            r = r.param("clearance", control.clearance, self.in_groom("control.clearance"));
+        }
+        r
+    }
+
+    fn comb_fields(&self, mut r: Recipe, i: usize, c: &Comb) -> Recipe {
+        let name = |key: &str| format!("comb[{i}].{key}");
+        let mut add = |key: &str, value: Option<String>| {
+            if let Some(value) = value {
+                r = std::mem::replace(&mut r, Recipe::new("", 0)).param(&name(key), value, self.in_groom(&name(key)));
+            }
+        };
+        add("kind", Some(format!("{:?}", c.kind)));
+        add("weight", Some(c.weight.to_string()));
+        add("points", c.points.as_ref().map(|p| format!("{p:?}")));
+        add("radius", c.radius.map(|x| x.to_string()));
+        add("falloff", c.falloff.map(|x| x.to_string()));
+        add("bend", c.bend.map(|x| x.to_string()));
+        add("curvature", Some(c.curvature.to_string()));
+        // A parting's name means nothing by itself: its place in the list does.
+        let parting = |n: &String| self.project.groom.value.parting.iter().position(|p| p.name == *n);
+        add("parting", c.parting.as_ref().and_then(parting).map(|p| p.to_string()));
+        add("side", c.side.map(|s| format!("{s:?}")));
+        add("space", c.space.map(|s| format!("{s:?}")));
+        add("angle", c.angle.map(|x| x.to_string()));
+        add("amount", c.amount.map(|x| x.to_string()));
+        add("value", c.value.map(|x| x.to_string()));
+        for (key, map) in [("region", &c.region), ("map", &c.map)] {
+            r = r.with(map.iter().flat_map(|m| self.map(&name(key), m)));
+        }
+        self.comb_guides(r, i, c)
+    }
+
+    /// What hairs follow.
+    fn comb_guides(&self, mut r: Recipe, i: usize, c: &Comb) -> Recipe {
+        let guides = [
+            ("primitive", serde_json::to_value(&c.primitive)),
+            ("divider", serde_json::to_value(&c.divider)),
+            ("element", serde_json::to_value(&c.element)),
+            ("shear", serde_json::to_value(&c.shear)),
+            ("scalp", serde_json::to_value(c.scalp)),
+        ];
+        for (key, value) in guides {
+            for (name, value) in leaves(&format!("comb[{i}].{key}"), &value.expect("plain numbers and names")) {
+                r = r.param(&name, value, self.in_groom(&name));
+            }
+        }
+        if c.reverse {
+            let name = format!("comb[{i}].reverse");
+            r = r.param(&name, true, self.in_groom(&name));
+        }
+        let Some(panels) = &c.panels else { return r };
+        let name = |key: &str| format!("comb[{i}].panels.{key}");
+        r = r.with(self.feature(&name("through"), &name("through"), &panels.through));
+        match self.project.panels.get(&i) {
+            Some(file) => r.file(&name("file"), &file.hash, file.label.clone()),
+            None => r.param(&name("most"), panels.most, self.in_groom(&name("most"))),
+        }
+    }
+}
+
+/// Numbers and names of a value with their keys, in order; what is not given is left out.
+fn leaves(key: &str, value: &serde_json::Value) -> Vec<(String, String)> {
+    use serde_json::Value::{Array, Null, Object};
+    match value {
+        Null => Vec::new(),
+        Object(all) => all.iter().flat_map(|(k, v)| leaves(&format!("{key}.{k}"), v)).collect(),
+        Array(all) if all.iter().any(|v| v.is_object()) => {
+            all.iter().enumerate().flat_map(|(k, v)| leaves(&format!("{key}[{k}]"), v)).collect()
+        }
+        Array(all) if all.is_empty() => Vec::new(),
+        other => vec![(key.to_owned(), other.to_string())],
+    }
+}
