@@ -43,6 +43,8 @@ pub struct ControlHairs {
     pub parting: Vec<u32>,
     /// \[H\] true for hairs on a chart's border, which several sites may share.
     pub border: Vec<bool>,
+    /// \[H\] which of the hairs placed one by one it is, or [`NONE`].
+    pub single: Vec<u32>,
     /// \[H\] length that the hair was cut to, scene units; infinite for one that never was.
     pub cut: Vec<f32>,
 }
@@ -82,6 +84,7 @@ impl ControlHairs {
         self.side.push(0);
         self.parting.push(NONE);
         self.border.push(false);
+        self.single.push(NONE);
         self.cut.push(f32::INFINITY);
     }
 }

@@ -308,6 +308,7 @@ fn encode_hairs(hairs: &ControlHairs) -> Vec<u8> {
     columns.push(("side", ply::Column::I32(hairs.side.iter().map(|s| i32::from(*s)).collect())));
     columns.push(("parting", ply::Column::U32(hairs.parting.clone())));
     columns.push(("border", ply::Column::U8(hairs.border.iter().map(|b| u8::from(*b)).collect())));
+    columns.push(("single", ply::Column::U32(hairs.single.clone())));
     columns.push(("cut", ply::Column::F32(hairs.cut.clone())));
     let comment = format!("control hairs, {} points each: n, du, dv along [N, dU, N x dU] from the root", hairs.points);
     encode(
@@ -335,6 +336,7 @@ fn decode_hairs(bytes: &[u8]) -> Option<ControlHairs> {
         side: side.iter().map(|s| *s as i8).collect(),
         parting: hair.u32("parting")?.to_vec(),
         border: border.iter().map(|b| *b != 0).collect(),
+        single: hair.u32("single")?.to_vec(),
         cut: hair.f32("cut")?.to_vec(),
     })
 }

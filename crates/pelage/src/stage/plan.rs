@@ -90,7 +90,7 @@ pub struct Plan {
 pub(super) mod version {
     pub const CURVES: u32 = 1;
     pub const PLACE: u32 = 1;
-    pub const COMB: u32 = 3;
+    pub const COMB: u32 = 4;
     pub const CANDIDATES: u32 = 1;
     pub const ROOTS: u32 = 1;
     pub const KEPT: u32 = 1;
