@@ -21,6 +21,7 @@ pub mod parting;
 pub mod place;
 mod point_grid;
 pub mod push_up;
+pub mod scalp;
 pub mod spline;
 #[cfg(test)]
 mod test_skin;

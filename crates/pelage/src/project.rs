@@ -156,7 +156,7 @@ impl Project {
                 if !path.is_file() {
                     return Err(missing(&shot, "groom.file", &path).into());
                 }
-                let groom: Document<GroomFile> = Document::read(&path)?;
+                let groom: Document<GroomFile> = Document::read_joined(&path)?;
                 groom.check()?;
                 groom
             }

@@ -149,6 +149,17 @@ pub fn update(tree: &mut Tree, bound: &[Bound]) -> Result<(), String> {
     Ok(())
 }
 
+/// Edits the cylinder of a cluster and brings along all that was split from it. A tree that can't be edited stays as it is.
+pub fn edit(tree: &mut Tree, cluster: u32, change: impl FnOnce(&mut Cylinder)) -> Result<(), String> {
+    let bound = bind(tree, cluster)?;
+    let mut out = tree.clone();
+    change(&mut out.cluster[cluster as usize].cylinder);
+    out.shape(cluster)?;
+    update(&mut out, &bound)?;
+    *tree = out;
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::test_clusters::{far, motion, plain, samples, upright};

@@ -1,6 +1,6 @@
 //! Hairs that follow clusters from their own roots.
 
-use super::{Owners, Region, Section, Shape, Tree};
+use super::{Region, Section, Shape, Tree};
 use pelage_geom::{NONE, Vec3, curve};
 use rayon::prelude::*;
 
@@ -30,21 +30,21 @@ pub enum Length {
     Scaled(f64),
 }
 
-/// Puts hairs into the last of their owners: r and theta are those of the root in the owner's region. `uv` in scalp
+/// Puts hairs into clusters (`of`, one a hair): r and theta are those of the root in the cluster's region. `uv` in scalp
 /// space and `root` in scene units, one a hair.
-pub fn attach(tree: &Tree, owners: &Owners, uv: &[[f64; 2]], root: &[Vec3]) -> Result<Vec<Rooted>, String> {
-    if uv.len() != root.len() || owners.owner.len() != uv.len() * owners.levels {
-        return Err(format!("owners and roots of {} hairs, and {} roots in scalp space", root.len(), uv.len()));
+pub fn attach(tree: &Tree, of: &[u32], uv: &[[f64; 2]], root: &[Vec3]) -> Result<Vec<Rooted>, String> {
+    if uv.len() != root.len() || of.len() != uv.len() {
+        return Err(format!("clusters and roots of {} hairs, and {} roots in scalp space", root.len(), uv.len()));
     }
-    let of = |(h, (uv, root)): (usize, (&[f64; 2], &Vec3))| {
-        let cluster = owners.leaf(h);
+    let rooted = |(cluster, (uv, root)): (&u32, (&[f64; 2], &Vec3))| {
+        let cluster = *cluster;
         let at = tree.cluster.get(cluster as usize).map_or([0.0; 2], |c| {
             let [r, angle] = c.region.polar(*uv);
             [r, angle - c.cylinder.twist.at(0.0)]
         });
         Rooted { root: *root, cluster, at }
     };
-    Ok(uv.iter().zip(root).enumerate().map(of).collect())
+    Ok(of.iter().zip(uv.iter().zip(root)).map(rooted).collect())
 }
 
 /// `n` places (r, theta) spread evenly over the contour at the root ([`Region::fill`]).
@@ -176,7 +176,7 @@ fn cut(line: &mut Vec<Vec3>, length: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::super::test_clusters::{samples, upright};
-    use super::super::{Cluster, split};
+    use super::super::{Cluster, Owners, split};
     use super::*;
     use pelage_geom::rng::uniform;
     use std::f64::consts::TAU;
@@ -193,7 +193,7 @@ mod tests {
             let uv: Vec<[f64; 2]> = (0..200).map(|k| [0, 1].map(|i| 1.3 * uniform(4, k, 0, i) - 0.6)).collect();
             let root: Vec<Vec3> = uv.iter().map(|[x, y]| Vec3::new(*x, *y, 0.1 * x * y)).collect();
             let owners = Owners::find(&tree, &uv);
-            let hairs = attach(&tree, &owners, &uv, &root).expect("attached");
+            let hairs = attach(&tree, &owners.last(), &uv, &root).expect("attached");
             let hairs: Vec<Rooted> = hairs.into_iter().filter(|h| h.cluster != NONE).collect();
             assert!(hairs.len() > 150 && hairs.iter().all(|h| (1..4).contains(&h.cluster)));
             let got = grow(&tree, &hairs, &[Length::Natural], 11, 0.5).expect("hairs");
@@ -301,6 +301,6 @@ mod tests {
         assert!(of(hair, &[Length::Cut(f64::NAN)], 3, 1.0).contains("length 0"));
         assert!(of(Rooted { cluster: NONE, ..hair }, &[Length::Natural], 3, 1.0).contains("hair 0 has no cluster"));
         assert!(of(Rooted { cluster: 4, ..hair }, &[Length::Natural], 3, 1.0).contains("cluster 4 of 1"));
-        assert!(attach(&tree, &Owners::default(), &[[0.0; 2]], &[]).is_err());
+        assert!(attach(&tree, &[], &[[0.0; 2]], &[]).is_err());
     }
 }

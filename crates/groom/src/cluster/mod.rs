@@ -11,6 +11,7 @@
 //! section, in radians; `r` from 0 on the skeleton to 1 on the contour, and beyond outside.
 
 mod bind;
+mod braid;
 mod curve;
 mod cylinder;
 mod grow;
@@ -24,7 +25,8 @@ mod style;
 mod test_clusters;
 mod tree;
 
-pub use bind::{Bound, Coordinates, bind, coordinates, position, update};
+pub use bind::{Bound, Coordinates, bind, coordinates, edit, position, update};
+pub use braid::{Braid, braid};
 pub use curve::Curve;
 pub use cylinder::{Contour, Cylinder};
 pub use grow::{Length, Rooted, attach, fill, fill_leaves, grow, line};

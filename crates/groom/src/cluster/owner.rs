@@ -71,6 +71,11 @@ impl Owners {
         &self.owner[h * self.levels..(h + 1) * self.levels]
     }
 
+    /// \[H\] the last owner of each hair, or [`NONE`].
+    pub fn last(&self) -> Vec<u32> {
+        (0..self.owner.len() / self.levels.max(1)).map(|h| self.leaf(h)).collect()
+    }
+
     /// The last owner of hair `h`, or [`NONE`].
     pub fn leaf(&self, h: usize) -> u32 {
         self.path(h).iter().rev().copied().find(|k| *k != NONE).unwrap_or(NONE)

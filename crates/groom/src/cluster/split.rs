@@ -52,7 +52,7 @@ pub fn split(tree: &mut Tree, cluster: u32, n: usize, points: usize) -> Result<V
 }
 
 /// The regions of `n` children: cells of relaxed centres.
-fn cells(region: &Region, n: usize) -> Vec<Region> {
+pub(super) fn cells(region: &Region, n: usize) -> Vec<Region> {
     if n == 1 {
         return vec![region.clone()];
     }
@@ -235,7 +235,7 @@ mod tests {
     /// Hairs that follow clusters of `tree` from its roots, in the order of `uv`.
     fn hairs(tree: &Tree, uv: &[[f64; 2]], root: &[Vec3]) -> Vec<Vec3> {
         let owners = Owners::find(tree, uv);
-        let hairs: Vec<Rooted> = attach(tree, &owners, uv, root).expect("attached");
+        let hairs: Vec<Rooted> = attach(tree, &owners.last(), uv, root).expect("attached");
         grow(tree, &hairs, &[Length::Natural], POINTS, 1.0).expect("hairs")
     }
 

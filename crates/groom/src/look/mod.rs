@@ -8,6 +8,7 @@
 pub mod axes;
 pub mod clump;
 pub mod curl;
+pub mod gather;
 mod lanes;
 pub mod member;
 pub mod noise;

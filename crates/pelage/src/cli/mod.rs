@@ -263,7 +263,7 @@ pub fn execute(arguments: Arguments) -> Result<bool, Error> {
         Command::Schema { file } => {
             let text = match file {
                 SchemaFile::Shot => crate::config::schema::<crate::config::ShotFile>(),
-                SchemaFile::Groom => crate::config::schema::<crate::config::GroomFile>(),
+                SchemaFile::Groom => crate::config::groom_schema(),
             };
             print(&text);
             Ok(true)

@@ -61,7 +61,7 @@ impl Seen {
         let text = |path: &Path, text: &str| (project.label(path), blake3::hash(text.as_bytes()).to_hex().to_string());
         let mut inputs: BTreeMap<String, String> =
             project.inputs().into_iter().map(|f| (f.label.clone(), f.hash.clone())).collect();
-        inputs.extend([text(&project.groom.path, &project.groom.text), text(&project.shot.path, &project.shot.text)]);
+        inputs.extend(project.groom.files().chain(project.shot.files()).map(|(p, t)| text(p, t)));
         Ok(Seen { picture: (key, project.out_dir()), inputs, project })
     }
 
@@ -69,7 +69,7 @@ impl Seen {
     fn files(&self) -> BTreeSet<PathBuf> {
         let p = &self.project;
         let mut files: BTreeSet<PathBuf> = p.inputs().into_iter().map(|f| f.path.clone()).collect();
-        files.extend([p.shot.path.clone(), p.groom.path.clone()]);
+        files.extend(p.groom.files().chain(p.shot.files()).map(|(p, _)| p.to_path_buf()));
         let folder = |f: &PathBuf| f.parent().map(|f| if f == Path::new("") { ".".into() } else { f.to_path_buf() });
         let folders: Vec<PathBuf> = files.iter().filter_map(folder).collect();
         files.extend(folders);

@@ -25,14 +25,14 @@ pub struct Comb {
     pub radius: Option<f64>,
     /// direction-curve: share of the radius over which the influence fades, 0 (hard) to 1. Default: 1.
     pub falloff: Option<f64>,
-    /// direction-curve, direction-map, field, flow: how far hairs turn toward the direction, 0 to 1. Default: 1.
+    /// direction-curve, direction-map, field, flow, cluster: how far hairs turn toward the direction, 0 to 1. Default: 1.
     pub bend: Option<f64>,
     /// 0: the whole hair turns at its root; 1: the turn grows from root to tip. Default: 0.
     #[serde(default)]
     pub curvature: f64,
-    /// direction-curve, field, flow, cut: acts only on one side of a parting.
+    /// direction-curve, field, flow, cluster, cut: acts only on one side of a parting.
     pub parting: Option<String>,
-    /// direction-curve, field, flow, cut: the side of that parting, seen along its points from outside.
+    /// direction-curve, field, flow, cluster, cut: the side of that parting, seen along its points from outside.
     pub side: Option<Side>,
     /// direction-map: RGB map of directions (0..1 stands for -1..1); bend, lay-down, length: a map that multiplies.
     pub map: Option<MapRef>,
@@ -58,6 +58,8 @@ pub struct Comb {
     /// flow: against the flow. Default: false.
     #[serde(default)]
     pub reverse: bool,
+    /// cluster: level of the clusters, 0 for those of the file. Default: 0.
+    pub level: Option<usize>,
     /// cut: where.
     pub shear: Option<Shear>,
     /// cut: hair gets the length of the shortest way around this ball to its plane. Default: it is cut where it meets the plane.
@@ -86,6 +88,8 @@ pub enum CombKind {
     Field,
     /// Lets hairs follow the streamlines of an ideal flow.
     Flow,
+    /// Lets hairs follow the clusters that they are in.
+    Cluster,
     /// Cuts hairs at planes.
     Cut,
 }
@@ -114,7 +118,7 @@ pub enum Space {
 impl Document<GroomFile> {
     /// Keys that belong to another kind are refused: nobody should tune a value that nothing reads.
     pub(super) fn check_comb(&self, key: &str, c: &Comb) -> Result<(), ConfigError> {
-        use CombKind::{Bend, Cut, DirectionCurve, DirectionMap, Field, Flow, LayDown, Length};
+        use CombKind::{Bend, Cluster, Cut, DirectionCurve, DirectionMap, Field, Flow, LayDown, Length};
         let needed = match c.kind {
             DirectionCurve => "points",
             DirectionMap => "map",
@@ -125,15 +129,16 @@ impl Document<GroomFile> {
             // A body that lets something through is a flow by itself.
             Flow if c.panels.is_none() => "element",
             Flow => "panels",
+            Cluster => "",
             Cut => "shear",
         };
-        let given: [(&str, bool, &[CombKind]); 18] = [
+        let given: [(&str, bool, &[CombKind]); 19] = [
             ("points", c.points.is_some(), &[DirectionCurve]),
             ("radius", c.radius.is_some(), &[DirectionCurve]),
             ("falloff", c.falloff.is_some(), &[DirectionCurve]),
-            ("bend", c.bend.is_some(), &[DirectionCurve, DirectionMap, Field, Flow]),
-            ("parting", c.parting.is_some(), &[DirectionCurve, Field, Flow, Cut]),
-            ("side", c.side.is_some(), &[DirectionCurve, Field, Flow, Cut]),
+            ("bend", c.bend.is_some(), &[DirectionCurve, DirectionMap, Field, Flow, Cluster]),
+            ("parting", c.parting.is_some(), &[DirectionCurve, Field, Flow, Cluster, Cut]),
+            ("side", c.side.is_some(), &[DirectionCurve, Field, Flow, Cluster, Cut]),
             ("map", c.map.is_some(), &[DirectionMap, Bend, LayDown, Length]),
             ("space", c.space.is_some(), &[DirectionMap]),
             ("angle", c.angle.is_some(), &[Bend]),
@@ -144,6 +149,7 @@ impl Document<GroomFile> {
             ("element", !c.element.is_empty(), &[Flow]),
             ("panels", c.panels.is_some(), &[Flow]),
             ("reverse", c.reverse, &[Flow]),
+            ("level", c.level.is_some(), &[Cluster]),
             ("shear", c.shear.is_some(), &[Cut]),
             ("scalp", c.scalp.is_some(), &[Cut]),
         ];
@@ -152,6 +158,9 @@ impl Document<GroomFile> {
         };
         self.keys(key, &given.map(read))?;
         self.check_guides(key, c)?;
+        if c.kind == Cluster && self.value.cluster.is_empty() {
+            return Err(self.error(key, "there are no clusters", "add a [[cluster]]"));
+        }
         if c.points.as_ref().is_some_and(|p| p.len() < 2 || !p.iter().flatten().all(|x| x.is_finite())) {
             return Err(self.error(&format!("{key}.points"), "must be two or more finite points", ""));
         }

@@ -1,7 +1,10 @@
 //! A configuration file: its text, what it says, and where it says it.
 
+use super::joined::Source;
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceSpan};
 use serde::de::{Deserialize, DeserializeOwned, Deserializer, Error as _};
+use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::de::{DeTable, DeValue};
 
@@ -14,8 +17,8 @@ pub struct ConfigError {
     pub what: String,
     /// What the user can do; empty if there is nothing to add.
     pub help: String,
-    source: Box<NamedSource<String>>,
-    span: Option<SourceSpan>,
+    pub(super) source: Box<NamedSource<String>>,
+    pub(super) span: Option<SourceSpan>,
 }
 
 impl std::fmt::Display for ConfigError {
@@ -88,42 +91,52 @@ where
 pub struct Document<T> {
     /// Where it was read.
     pub path: PathBuf,
-    /// As it stands on disk.
-    pub text: String,
     /// What it says.
     pub value: T,
+    source: Source,
+    /// Keys that other files than the first say, and which.
+    elsewhere: BTreeMap<String, usize>,
 }
 
 impl<T: DeserializeOwned> Document<T> {
     /// Reads and parses a file. Unknown keys are refused, with the nearest known one as advice.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
-        let bytes = std::fs::read(path).map_err(|e| {
-            let help = match e.kind() {
-                std::io::ErrorKind::NotFound => "`pelage init DIR` makes a shot folder that runs as it is",
-                _ => "",
-            };
-            plain(path, format!("can't be read: {e}"), help.to_owned())
-        })?;
-        let text = String::from_utf8(bytes).map_err(|e| {
-            let at = e.utf8_error().valid_up_to();
-            plain(path, format!("is not UTF-8 text (byte {at})"), "save it as UTF-8".to_owned())
-        })?;
-        Self::parse(path, text)
+        Self::of(Source::plain(path, read_text(path)?))
+    }
+
+    /// Reads a file with all that it includes and is like.
+    pub fn read_joined(path: &Path) -> Result<Self, ConfigError> {
+        Self::of(Source::joined(path, read_text(path)?)?)
     }
 
     /// Parses the text of a file.
     pub fn parse(path: &Path, text: String) -> Result<Self, ConfigError> {
-        match toml::from_str(&text) {
-            Ok(value) => Ok(Document { path: path.to_path_buf(), text, value }),
-            Err(e) => Err(ConfigError {
-                path: path.to_path_buf(),
-                what: first_line(e.message()),
-                help: suggestion(e.message()).unwrap_or_default(),
-                span: e.span().map(SourceSpan::from),
-                source: Box::new(NamedSource::new(path.display().to_string(), text)),
-            }),
-        }
+        Self::of(Source::plain(path, text))
     }
+
+    fn of(source: Source) -> Result<Self, ConfigError> {
+        let tree = source.tree()?;
+        let elsewhere = source.elsewhere(tree.get_ref());
+        let read = T::deserialize(toml::Deserializer::from(tree));
+        let value = read.map_err(|e| {
+            source.error(e.span(), first_line(e.message()), suggestion(e.message()).unwrap_or_default())
+        })?;
+        Ok(Document { path: source.part[0].path.clone(), value, source, elsewhere })
+    }
+}
+
+fn read_text(path: &Path) -> Result<String, ConfigError> {
+    let bytes = std::fs::read(path).map_err(|e| {
+        let help = match e.kind() {
+            std::io::ErrorKind::NotFound => "`pelage init DIR` makes a shot folder that runs as it is",
+            _ => "",
+        };
+        plain(path, format!("can't be read: {e}"), help.to_owned())
+    })?;
+    String::from_utf8(bytes).map_err(|e| {
+        let at = e.utf8_error().valid_up_to();
+        plain(path, format!("is not UTF-8 text (byte {at})"), "save it as UTF-8".to_owned())
+    })
 }
 
 impl<T> Document<T> {
@@ -138,13 +151,18 @@ impl<T> Document<T> {
     /// A complaint about the value at a key such as `layer[0].length.value`; points at the longest part of the key that
     /// the file has.
     pub fn error(&self, key: &str, what: impl Into<String>, help: impl Into<String>) -> ConfigError {
-        ConfigError {
-            path: self.path.clone(),
-            what: format!("{key}: {}", what.into()),
-            help: help.into(),
-            span: span_of(&self.text, key),
-            source: Box::new(NamedSource::new(self.path.display().to_string(), self.text.clone())),
-        }
+        let span = self.source.tree().ok().and_then(|tree| span_of(tree.get_ref(), key));
+        self.source.error(span, format!("{key}: {}", what.into()), help.into())
+    }
+
+    /// The files that it was read from and their texts, the one that includes the others first.
+    pub fn files(&self) -> impl Iterator<Item = (&Path, &str)> {
+        self.source.part.iter().map(|p| (p.path.as_path(), p.text()))
+    }
+
+    /// The file that says a key, or would.
+    pub fn file_of(&self, key: &str) -> &Path {
+        &self.source.part[self.elsewhere.get(key).copied().unwrap_or(0)].path
     }
 
     /// A path written in this file, relative to the file's folder.
@@ -157,7 +175,7 @@ impl<T> Document<T> {
 }
 
 /// Takes `x/..` and `.` out of a path without asking the disk.
-fn tidy(path: &Path) -> PathBuf {
+pub(super) fn tidy(path: &Path) -> PathBuf {
     use std::path::Component;
     let mut out: Vec<Component<'_>> = Vec::new();
     for part in path.components() {
@@ -172,7 +190,7 @@ fn tidy(path: &Path) -> PathBuf {
     out.iter().collect()
 }
 
-fn plain(path: &Path, what: String, help: String) -> ConfigError {
+pub(super) fn plain(path: &Path, what: String, help: String) -> ConfigError {
     let source = Box::new(NamedSource::new(path.display().to_string(), String::new()));
     ConfigError { path: path.to_path_buf(), what, help, source, span: None }
 }
@@ -187,20 +205,23 @@ fn suggestion(message: &str) -> Option<String> {
         return None;
     }
     let mut quoted = message.split('`').skip(1).step_by(2);
-    let wrong = quoted.next()?;
-    let (distance, best) = quoted.map(|k| (strsim::damerau_levenshtein(wrong, k), k)).min()?;
+    nearest(quoted.next()?, quoted)
+}
+
+/// "did you mean" the nearest of `known`, if one is near.
+pub(super) fn nearest<'a>(wrong: &str, known: impl Iterator<Item = &'a str>) -> Option<String> {
+    let (distance, best) = known.map(|k| (strsim::damerau_levenshtein(wrong, k), k)).min()?;
     (distance <= 1 + best.len().max(wrong.len()) / 3).then(|| format!("did you mean `{best}`?"))
 }
 
 /// Byte range of a key's value, or of the nearest enclosing value that exists.
-fn span_of(text: &str, key: &str) -> Option<SourceSpan> {
-    let root = DeTable::parse(text).ok()?;
+pub(super) fn span_of(root: &DeTable<'_>, key: &str) -> Option<Range<usize>> {
     let mut span = None;
     let mut at: Option<&DeValue<'_>> = None;
     for part in key.split('.') {
         let (name, indices) = part.split_once('[').map_or((part, ""), |(n, i)| (n, i));
         let next = match at {
-            None => root.get_ref().get(name),
+            None => root.get(name),
             Some(DeValue::Table(t)) => t.get(name),
             Some(_) => None,
         };
@@ -214,8 +235,7 @@ fn span_of(text: &str, key: &str) -> Option<SourceSpan> {
             at = Some(item.get_ref());
         }
     }
-    // A whole table would underline many lines: its first line says enough.
-    span.map(|s| (s.start..text[s.clone()].find('\n').map_or(s.end, |n| s.start + n)).into())
+    span
 }
 
 #[cfg(test)]

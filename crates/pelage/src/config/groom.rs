@@ -1,5 +1,6 @@
 //! The groom file: control hairs, how they are combed, and the layers of hair grown from maps.
 
+use super::cluster::{Cluster, ClusterEdit, ClusterLook, Scalp};
 use super::comb::Comb;
 use super::document::{ConfigError, Document, Fixed, exactly};
 use super::look::{Clump, Collision, Curl, Emitter, Noise, Operator, Wave, WindLook};
@@ -20,6 +21,15 @@ pub struct GroomFile {
     /// Lines on the skin across which no hair mixes control hairs.
     #[serde(default)]
     pub parting: Vec<Parting>,
+    /// Scalp space: where clusters and growth are drawn.
+    #[serde(default)]
+    pub scalp: Scalp,
+    /// Clusters of hair.
+    #[serde(default)]
+    pub cluster: Vec<Cluster>,
+    /// How clusters are split, braided and copied, in this order.
+    #[serde(default)]
+    pub cluster_edit: Vec<ClusterEdit>,
     /// Combing, in this order.
     #[serde(default)]
     pub comb: Vec<Comb>,
@@ -89,7 +99,7 @@ fn grid<'de, D: Deserializer<'de>>(d: D) -> Result<Option<[usize; 2]>, D::Error>
     exactly(d).map(Some)
 }
 
-fn points<'de, D: Deserializer<'de>>(d: D) -> Result<Vec<[f64; 3]>, D::Error> {
+pub(super) fn points<'de, D: Deserializer<'de>>(d: D) -> Result<Vec<[f64; 3]>, D::Error> {
     Ok(Vec::<Fixed<f64, 3>>::deserialize(d)?.into_iter().map(|p| p.0).collect())
 }
 
@@ -296,6 +306,8 @@ pub struct Layer {
     pub material: Material,
     /// What is simulated of this layer. Default: what the shot says.
     pub simulate: Option<Target>,
+    /// Hair takes its place in clusters.
+    pub cluster: Option<ClusterLook>,
     /// Levels of clumps, the finest first.
     #[serde(default)]
     pub clump: Vec<Clump>,
@@ -312,7 +324,7 @@ pub struct Layer {
     /// Keeping finished hairs out of the skin.
     #[serde(default)]
     pub collision: Collision,
-    /// Order in which the operators act. Default: clump, curl, wave, noise, wind. Collision comes last.
+    /// Order in which the operators act. Default: cluster, clump, curl, wave, noise, wind. Collision comes last.
     pub order: Option<Vec<Operator>>,
 }
 
@@ -349,6 +361,7 @@ impl Document<GroomFile> {
         for (i, c) in self.value.comb.iter().enumerate() {
             self.check_comb(&format!("comb[{i}]"), c)?;
         }
+        self.check_clusters()?;
         self.check_emitters()?;
         if self.value.layer.is_empty() {
             return Err(self.error("layer", "the groom has no layer", "add a [[layer]]"));

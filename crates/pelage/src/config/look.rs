@@ -27,7 +27,7 @@ fn yes() -> bool {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Clump {
-    /// Clumps per square centimetre; their centres are hairs of the layer. One of density, regions, roots and curves is given.
+    /// Clumps per square centimetre; their centres are hairs of the layer. One of density, regions, roots, curves and clusters is given.
     pub density: Option<LookValue>,
     /// Regions of equal value of a map are clumps.
     pub regions: Option<MapRef>,
@@ -38,6 +38,9 @@ pub struct Clump {
     /// their roots.
     #[serde(default, deserialize_with = "some_lines")]
     pub curves: Option<Lines>,
+    /// Clusters of this level are clumps, 0 for those of the file; their lines are the centres. A hair's place in the cluster
+    /// decides how near to the rim it is.
+    pub clusters: Option<usize>,
     /// Radius of a clump, scene units (for regions: the longest step between hairs of one region). Default: four times the
     /// distance between clumps of that density; a centimetre for clumps placed by hand.
     pub size: Option<LookValue>,
@@ -425,6 +428,8 @@ impl Default for Collision {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Operator {
+    /// `[layer.cluster]`.
+    Cluster,
     /// `[[layer.clump]]`, all levels.
     Clump,
     /// `[layer.curl]`.
@@ -441,6 +446,7 @@ impl Operator {
     /// Name as written in a file.
     pub fn name(self) -> &'static str {
         match self {
+            Operator::Cluster => "cluster",
             Operator::Clump => "clump",
             Operator::Curl => "curl",
             Operator::Wave => "wave",
@@ -450,7 +456,8 @@ impl Operator {
     }
 
     /// The order in which they act if a layer does not say otherwise.
-    pub const ALL: [Operator; 5] = [Operator::Clump, Operator::Curl, Operator::Wave, Operator::Noise, Operator::Wind];
+    pub const ALL: [Operator; 6] =
+        [Operator::Cluster, Operator::Clump, Operator::Curl, Operator::Wave, Operator::Noise, Operator::Wind];
 }
 
 /// Particles that hit the skin and open areas of clumped (wet) hair.
@@ -500,6 +507,11 @@ fn never() -> Keyed<f64> {
 }
 
 impl Clump {
+    /// True if its centres are lines and not hairs.
+    pub fn has_lines(&self) -> bool {
+        self.curves.is_some() || self.clusters.is_some()
+    }
+
     /// Parameters that act on hairs of a clump.
     pub fn varied(&self) -> Vec<Varied<'_>> {
         let unit = [0.0, 1.0];
@@ -537,6 +549,7 @@ impl Layer {
     pub fn varied(&self) -> Vec<(String, Varied<'_>)> {
         let mut out = Vec::new();
         let mut add = |key: String, all: Vec<_>| out.extend(all.into_iter().map(|v| (key.clone(), v)));
+        self.cluster.iter().for_each(|c| add("cluster".to_owned(), vec![varied("percent", &c.percent, [0.0, 1.0])]));
         for (k, c) in self.clump.iter().enumerate() {
             add(format!("clump[{k}]"), c.making().into_iter().chain(c.varied()).collect());
         }
@@ -582,6 +595,7 @@ impl Layer {
     /// True for each part of an operator that is handed to the simulation.
     pub(super) fn simulated(&self, operator: Operator) -> Vec<bool> {
         match operator {
+            Operator::Cluster => self.cluster.iter().map(|c| c.simulate).collect(),
             Operator::Clump => self.clump.iter().map(|c| c.simulate).collect(),
             Operator::Curl => self.curl.iter().map(|c| c.simulate).collect(),
             Operator::Wave => self.wave.iter().map(|w| w.simulate).collect(),

@@ -2,7 +2,7 @@
 
 use super::document::{ConfigError, Document};
 use super::keyed::{Keyed, Vector};
-use super::look_value::Varied;
+use super::look_value::{Varied, varied};
 use super::{Clump, ClumpOf, Curl, CurlKind, GroomFile, Layer, Operator};
 
 impl Document<GroomFile> {
@@ -18,6 +18,15 @@ impl Document<GroomFile> {
             if c.per_clump && l.clump.is_empty() {
                 let help = "add a [[layer.clump]], or take it out";
                 return Err(self.error(&format!("{at}.curl.per_clump"), "the layer has no clumps", help));
+            }
+        }
+        if let Some(c) = &l.cluster {
+            if self.value.cluster.is_empty() {
+                return Err(self.error(&format!("{at}.cluster"), "there are no clusters", "add a [[cluster]]"));
+            }
+            self.within(&format!("{at}.cluster.start"), c.start, 1e-3, 1.0)?;
+            if c.simulate {
+                self.check_rest_shape(&format!("{at}.cluster"), &[varied("percent", &c.percent, [0.0, 1.0])])?;
             }
         }
         for (k, c) in l.clump.iter().enumerate().filter(|(_, c)| c.simulate) {
@@ -89,13 +98,20 @@ impl Document<GroomFile> {
     }
 
     fn check_clump(&self, at: &str, level: usize, c: &Clump) -> Result<(), ConfigError> {
-        let given = [c.density.is_some(), c.regions.is_some(), c.roots.is_some(), c.curves.is_some()];
+        let given =
+            [c.density.is_some(), c.regions.is_some(), c.roots.is_some(), c.curves.is_some(), c.clusters.is_some()];
         if given.iter().filter(|g| **g).count() != 1 {
             return Err(self.error(
                 at,
                 "does not say what its clumps are",
-                "give one of density, regions, roots, curves",
+                "give one of density, regions, roots, curves, clusters",
             ));
+        }
+        if c.clusters.is_some() && self.value.cluster.is_empty() {
+            return Err(self.error(&format!("{at}.clusters"), "there are no clusters", "add a [[cluster]]"));
+        }
+        if c.clusters.is_some() && c.size.is_some() {
+            return Err(self.error(&format!("{at}.size"), "is not read beside clusters", "take it out"));
         }
         for v in c.making() {
             if v.value.0.value.0.len() > 1 {
@@ -200,10 +216,10 @@ impl Document<GroomFile> {
     /// Every operator once, and what is simulated before what is not.
     fn check_order(&self, at: &str, l: &Layer) -> Result<(), ConfigError> {
         let order = l.order();
-        let all = Operator::ALL.iter().all(|o| order.iter().filter(|p| *p == o).count() == 1);
-        if !all || order.len() != Operator::ALL.len() {
-            let help = "[\"clump\", \"curl\", \"wave\", \"noise\", \"wind\"] in another order";
-            return Err(self.error(&format!("{at}.order"), "must name every operator once", help));
+        let count = |o: &Operator| order.iter().filter(|p| *p == o).count();
+        if Operator::ALL.iter().any(|o| count(o) > 1 || count(o) == 0 && l.has(*o)) {
+            let help = "[\"cluster\", \"clump\", \"curl\", \"wave\", \"noise\", \"wind\"] in another order";
+            return Err(self.error(&format!("{at}.order"), "must name every operator of the layer once", help));
         }
         let simulated: Vec<bool> = order.iter().flat_map(|o| l.simulated(*o)).collect();
         if simulated.windows(2).any(|w| !w[0] && w[1]) {

@@ -116,6 +116,8 @@ pub struct GroomRef {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Look {
+    /// Let hair take its place in clusters. Default: true.
+    pub cluster: bool,
     /// Clump hair. Default: true.
     pub clump: bool,
     /// Curl it. Default: true.
@@ -135,7 +137,16 @@ pub struct Look {
 
 impl Default for Look {
     fn default() -> Self {
-        Look { clump: true, curl: true, wave: true, noise: true, wind: true, collision: true, overrides: Vec::new() }
+        Look {
+            cluster: true,
+            clump: true,
+            curl: true,
+            wave: true,
+            noise: true,
+            wind: true,
+            collision: true,
+            overrides: Vec::new(),
+        }
     }
 }
 
@@ -143,6 +154,7 @@ impl Look {
     /// True if an operator acts in this shot.
     pub fn has(&self, operator: Operator) -> bool {
         match operator {
+            Operator::Cluster => self.cluster,
             Operator::Clump => self.clump,
             Operator::Curl => self.curl,
             Operator::Wave => self.wave,

@@ -3,7 +3,7 @@
 use super::run::{Counts, Runner};
 use super::skin::Texel;
 use super::tables::{decode, encode, table};
-use super::{What, groom, instance, layer_seed, plan_look::joins_clumps};
+use super::{What, clusters, groom, instance, layer_seed, plan_look::joins_clumps};
 use crate::Error;
 use crate::config::{Clump, LookValue, MapRef};
 use crate::format::ply::Column;
@@ -89,7 +89,9 @@ fn find(run: &mut Runner<'_>, i: usize, k: usize, what: What) -> Result<Members,
     let side = sides(&relative, f64::from(sizes.most()), &sites);
     sites.side = &side;
     let before = if joins_clumps(&c, k) { Some(clumps(run, i, k - 1)?) } else { None };
-    let found = if c.regions.is_some() {
+    let found = if let Some(level) = c.clusters {
+        in_clusters(run, level, &roots, &open)?
+    } else if c.regions.is_some() {
         in_regions(run, &c, &roots, &sites, sizes.value, &open)?
     } else {
         let stands = before.as_ref().map(|b| representatives(b)).unwrap_or_default();
@@ -199,6 +201,27 @@ fn in_regions(
     let map = run.map(map, Texel::Value)?;
     let value: Vec<f32> = roots.uv.iter().map(|uv| map.nearest(*uv)).collect();
     Ok(regions(sites, &value, near, open))
+}
+
+/// Clusters of a level as clumps; centres are the hairs nearest to their middles.
+fn in_clusters(run: &mut Runner<'_>, level: usize, roots: &Roots, open: &[bool]) -> Result<Members, Error> {
+    let (tree, uv) = (clusters::tree(run)?, clusters::coordinates(run, &roots.root)?);
+    let mut of = clusters::owners(&tree, &uv, Some(level));
+    of.iter_mut().zip(open).filter(|(_, open)| !**open).for_each(|(k, _)| *k = NONE);
+    let middle = clusters::middles(&tree, &of, &uv);
+    let mut number = vec![NONE; middle.len()];
+    let mut found = Members::default();
+    for (k, h) in middle.iter().enumerate().filter(|(_, h)| **h != NONE) {
+        number[k] = found.centre.len() as u32;
+        found.centre.push(*h);
+    }
+    for (k, at) in of.iter().zip(&uv) {
+        let own = number.get(*k as usize).copied().unwrap_or(NONE);
+        let r = tree.cluster.get(*k as usize).map_or(0.0, |c| c.region.polar(*at)[0]);
+        found.clump.push(own);
+        found.reach.push(r.min(1.0) as f32);
+    }
+    Ok(found)
 }
 
 fn write(m: &Members) -> Vec<u8> {

@@ -218,7 +218,7 @@ fn comb_hairs(run: &mut Runner<'_>) -> Result<ControlHairs, Error> {
     let millimetre = 1e-3 / project.shot.value.shot.meters_per_unit;
     let clearance = control.clearance * millimetre;
     let guard = Guard { surface: skin.bvh(), clearance };
-    let (guides, points) = (guides::guides(run)?, hairs.points);
+    let (guides, points) = (guides::guides(run, &hairs)?, hairs.points);
     let trace: Vec<_> =
         guides.iter().map(|g| g.as_ref().map(|g| |starts: &[Start]| g.lines(points, &guard, starts))).collect();
     let combs = &project.groom.value.comb;
@@ -287,7 +287,9 @@ fn operation<'a>(
         },
         Kind::Bend => CombKind::Bend { angle: c.angle.unwrap_or(0.0), map: map.as_ref(), curvature },
         Kind::LayDown => CombKind::LayDown { amount: c.amount.unwrap_or(0.0), map: map.as_ref() },
-        Kind::Field | Kind::Flow => CombKind::Follow { guides: guides.expect("made for these kinds"), bend, curvature },
+        Kind::Field | Kind::Flow | Kind::Cluster => {
+            CombKind::Follow { guides: guides.expect("made for these kinds"), bend, curvature }
+        }
         Kind::Cut => CombKind::Cut {
             shear: shear.expect("checked: a cut has its planes"),
             scalp: c.scalp.as_ref().map(guides::ball),

@@ -1,17 +1,20 @@
 //! Fields that control hairs are combed along.
 
-use super::groom;
 use super::look::barrier;
 use super::run::Runner;
 use super::skin::Texel;
+use super::{clusters, groom};
 use crate::Error;
 use crate::config::{Ball, Comb, CombKind, Element, ElementKind, Orientation, Panels, Plane, Primitive, Region, Shear};
 use crate::format::ply;
 use nalgebra::UnitQuaternion;
 use pelage_geom::{Bvh, Mesh, Pose, TiledMap, Vec3};
+use pelage_groom::cluster::Tree;
+use pelage_groom::control::ControlHairs;
 use pelage_groom::field::{self, Falloff, GuideField, lengths};
 use pelage_groom::flow::trace::{Guard, Lines, Start, Trace, trace};
 use pelage_groom::flow::{self, Body, Fast, Grid, OPENING, coarse};
+use std::sync::Arc;
 
 /// Cells along the longest side of the box that lines can come to: velocities between are off by 1e-4 in the middle, and more
 /// where the flow nearly rests. Twice as many take eight times as long to fill.
@@ -23,10 +26,22 @@ const STEP: f64 = 0.25;
 /// Lines from which on a grid is worth filling.
 const MANY: usize = 2000;
 
+/// Share of their length over which control hairs come into their cluster: less, and they bend sharply at the skin.
+const START: f64 = 0.15;
+
 /// What an operation lets hairs follow.
 pub(super) enum Guides {
     Field(GuideField),
     Flow(Flow),
+    /// Lines through clusters from all roots, by their lengths.
+    Clusters(InClusters),
+}
+
+/// Roots of all control hairs in clusters.
+pub(super) struct InClusters {
+    tree: Arc<Tree>,
+    of: Vec<u32>,
+    uv: Vec<[f64; 2]>,
 }
 
 /// A flow with its body solved.
@@ -37,12 +52,17 @@ pub(super) struct Flow {
 }
 
 /// What the operations of a groom let hairs follow; `None` for those that follow nothing.
-pub(super) fn guides(run: &mut Runner<'_>) -> Result<Vec<Option<Guides>>, Error> {
+pub(super) fn guides(run: &mut Runner<'_>, hairs: &ControlHairs) -> Result<Vec<Option<Guides>>, Error> {
     let project = run.project;
     let each = project.groom.value.comb.iter().enumerate();
     each.map(|(i, c)| match c.kind {
         CombKind::Field => Ok(Some(Guides::Field(field_of(c)))),
         CombKind::Flow => Ok(Some(Guides::Flow(flow_of(run, i, c)?))),
+        CombKind::Cluster => {
+            let (tree, uv) = (clusters::tree(run)?, clusters::coordinates(run, &hairs.root)?);
+            let of = clusters::owners(&tree, &uv, Some(c.level.unwrap_or(0)));
+            Ok(Some(Guides::Clusters(InClusters { tree, of, uv })))
+        }
         _ => Ok(None),
     })
     .collect()
@@ -56,6 +76,10 @@ impl Guides {
         let settings = Trace { points, step, reverse: false, slow: 0.0 };
         match self {
             Guides::Field(field) => field.trace(starts, &settings, Some(guard)),
+            Guides::Clusters(c) => {
+                let (root, length): (Vec<Vec3>, Vec<f64>) = starts.iter().map(|s| (s.at, s.length)).unzip();
+                clusters::lines(&c.tree, &c.of, &c.uv, &root, &length, points, START).expect("the tree was checked")
+            }
             Guides::Flow(f) => f.lines(&Trace { reverse: f.reverse, ..settings }, guard, starts, longest),
         }
     }

@@ -4,7 +4,7 @@ use super::plan_kept::hairs_of;
 use super::run::{Counts, Runner};
 use super::skin::Texel;
 use super::tables::{decode, encode, id_columns, ids_of, root_columns, roots_of, table, vector_columns, vectors_of};
-use super::{Skin, What, candidate_density, groom, kept, layer_seed};
+use super::{Skin, What, candidate_density, clusters, groom, kept, layer_seed};
 use crate::Error;
 use crate::config::{Feature, Guard};
 use crate::format::ply::Column;
@@ -12,6 +12,7 @@ use pelage_geom::{SurfacePoint, TiledMap, rng};
 use pelage_groom::candidates::{Candidates, candidates as find_candidates};
 use pelage_groom::instance::{Density, Feature as FeatureSource, Roots, colour_column, feature_column, scale_guards};
 use pelage_groom::instance::{roots as find_roots, weights as find_weights};
+use pelage_groom::keep::kept as kept_roots;
 use pelage_groom::triangulate::{mirrored_charts, triangulate};
 use std::rc::Rc;
 
@@ -130,7 +131,12 @@ fn grow(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
             .push(format!("layer {}: the density map exceeds 1; candidates beyond the cached ones", layer.name));
         candidates = search(&skin, seed, needed);
     }
-    let found = find_roots(&skin.mesh, &skin.topology, &candidates, &density, seed);
+    let mut found = find_roots(&skin.mesh, &skin.topology, &candidates, &density, seed);
+    let growing = clusters::growing(run, &found.root)?;
+    if !growing.is_empty() {
+        found = kept_roots(&found, &growing);
+    }
+    let layer = &run.project.groom.value.layer[i];
     let counts = Counts::from([
         ("hairs".to_owned(), found.id.len() as u64),
         (format!("hairs in layer {}", layer.name), found.id.len() as u64),

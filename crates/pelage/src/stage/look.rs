@@ -4,18 +4,20 @@ use super::clumps::{self, RestSites};
 use super::plan_look::{Effect, by_clump, changes_hairs, collides, look_in, overridden};
 use super::run::{Counts, Runner};
 use super::skin::Texel;
-use super::{SkinPose, What, groom, instance, interpolate, layer_seed};
+use super::{SkinPose, What, clusters, groom, instance, interpolate, layer_seed};
 use crate::Error;
 use crate::config::{self, CurlKind, LookValue, WaveShape};
 use crate::format::HairLayer;
 use crate::project::SkinAt;
-use pelage_geom::{Bvh, NONE, Offsets, Vec3, rng};
+use pelage_geom::{Bvh, NONE, Offsets, Vec3, curve, rng};
 use pelage_groom::along::scaled;
+use pelage_groom::cluster;
 use pelage_groom::depenetrate::{Depenetrate, depenetrate};
 use pelage_groom::instance::Roots;
 use pelage_groom::look::axes::{RootAxes, carried, rest_axes};
 use pelage_groom::look::clump::{Clump, bind_lines, centre_lines, clump, dilations, drawn_lines, wet};
 use pelage_groom::look::curl::{Curl, Wave as CurlWave, curl, dished, helix, uniplanar};
+use pelage_groom::look::gather::gather;
 use pelage_groom::look::member::{Members, centre_of_each};
 use pelage_groom::look::noise::{Noise, noise};
 use pelage_groom::look::refine::refine;
@@ -40,7 +42,9 @@ pub struct LayerLook {
     root: BTreeMap<usize, Vec<f32>>,
     /// Axes of the roots at rest, in their root frames; empty if nothing needs them.
     axes: Vec<RootAxes>,
-    /// Lines drawn by hand, in the axes of their carriers, by level.
+    /// Places of hairs in clusters.
+    clusters: InClusters,
+    /// Lines of clumps that are no hairs, in the axes of their carriers, by level.
     drawn: BTreeMap<usize, Vec<[f32; 3]>>,
 }
 
@@ -188,14 +192,17 @@ fn prepared(
         };
         look.axes = rest_axes(&skin.mesh, &skin.topology, &skin.rest, &roots.root, points, &rest);
     }
+    if acting.contains(&Effect::Cluster) {
+        look.clusters = in_clusters(run, i, points, &rest, &look.axes)?;
+    }
     for effect in acting {
         columns(run, i, *effect, &roots, &sites, &mut look)?;
         if let Effect::Clump(k) = effect
-            && let Some(lines) = &run.project.groom.value.layer[i].clump[*k].curves
+            && let Some(lines) = clump_lines(run, i, *k, points)?
         {
             let members = clumps::clumps(run, i, *k)?;
             let axes = carried(&skin.mesh, &skin.topology, &skin.rest, &roots.root, &look.axes);
-            let line = sampled(lines, Vec3::from(skin.origin()), points);
+            let line = sampled(&lines, Vec3::from(skin.origin()), points);
             look.drawn.insert(*k, bind_lines(points, &rest, &members.centre, &axes, &line));
         }
     }
@@ -209,11 +216,74 @@ fn refined(position: Vec<[f32; 3]>, from: usize, to: usize) -> Vec<[f32; 3]> {
     if from == to { position } else { refine(from, to, &position) }
 }
 
-/// C lines drawn by hand, scene units, as C times P points relative to an origin.
-fn sampled(lines: &[Vec<[f64; 3]>], origin: Vec3, points: usize) -> Vec<[f32; 3]> {
-    let sampled = |line: &Vec<[f64; 3]>| {
-        let line: Vec<Vec3> = line.iter().map(|p| Vec3::from(*p) - origin).collect();
-        pelage_geom::curve::resample(&line, points)
+/// The lines of a level's clumps where these are no hairs, scene units.
+fn clump_lines(run: &mut Runner<'_>, i: usize, k: usize, points: usize) -> Result<Option<Vec<Vec<Vec3>>>, Error> {
+    let c = &run.project.groom.value.layer[i].clump[k];
+    if let Some(lines) = &c.curves {
+        return Ok(Some(lines.iter().map(|l| l.iter().map(|p| Vec3::from(*p)).collect()).collect()));
+    }
+    let Some(level) = c.clusters else { return Ok(None) };
+    let (members, roots, tree) = (clumps::clumps(run, i, k)?, instance::roots(run, i)?, clusters::tree(run)?);
+    let centre: Vec<_> = members.centre.iter().map(|h| roots.root[*h as usize]).collect();
+    let of = clusters::owners(&tree, &clusters::coordinates(run, &centre)?, Some(level));
+    let line = |k: &u32| cluster::line(&tree.shape(*k).expect("the tree was checked"), points);
+    Ok(Some(of.iter().map(line).collect()))
+}
+
+/// Hairs of a layer in clusters: their places, in the axes of the hairs that carry them.
+#[derive(Debug, Default)]
+struct InClusters {
+    /// Hairs that are in one, cluster after cluster.
+    hair: Vec<u32>,
+    /// The hair that carries each.
+    carrier: Vec<u32>,
+    /// \[hairs * P\] points in its axes.
+    local: Vec<[f32; 3]>,
+    /// \[P\] how far a hair's own root counts at each point.
+    rooted: Vec<f32>,
+}
+
+fn in_clusters(
+    run: &mut Runner<'_>,
+    i: usize,
+    points: usize,
+    rest: &[[f32; 3]],
+    axes: &[RootAxes],
+) -> Result<InClusters, Error> {
+    let layer = run.project.groom.value.layer[i].cluster.clone().expect("the layer has clusters");
+    let (skin, tree, roots) = (groom::skin(run)?, clusters::tree(run)?, instance::roots(run, i)?);
+    let uv = clusters::coordinates(run, &roots.root)?;
+    let top = clusters::owners(&tree, &uv, Some(0));
+    let middle = clusters::middles(&tree, &top, &uv);
+    let of = clusters::owners(&tree, &uv, layer.level);
+    let origin = Vec3::from(skin.origin());
+    let at: Vec<Vec3> = roots.root.iter().map(|p| skin.mesh.point(p)).collect();
+    let length: Vec<f64> = rest.chunks_exact(points).map(curve::length).collect();
+    let wrong = |e: String| run.project.groom.error(&format!("layer[{i}].cluster"), e, "");
+    let lines = clusters::lines(&tree, &of, &uv, &at, &length, points, layer.start).map_err(wrong)?;
+    let mut hair: Vec<u32> = (0..of.len() as u32).filter(|h| of[*h as usize] != NONE).collect();
+    // Hairs of one carrier side by side.
+    hair.sort_by_key(|h| (top[*h as usize], *h));
+    let carrier: Vec<u32> = hair.iter().map(|h| middle[top[*h as usize] as usize]).collect();
+    let single = |p: &Vec3| {
+        let p = p - origin;
+        [p.x as f32, p.y as f32, p.z as f32]
+    };
+    let line: Vec<[f32; 3]> = hair.iter().flat_map(|h| lines.line(*h as usize).iter().map(single)).collect();
+    let now = carried(&skin.mesh, &skin.topology, &skin.rest, &roots.root, axes);
+    let local = bind_lines(points, rest, &carrier, &now, &line);
+    let fade = |k: usize| {
+        let x = (k as f64 / (points - 1) as f64 / layer.start).min(1.0);
+        (1.0 - x * x * (3.0 - 2.0 * x)) as f32
+    };
+    Ok(InClusters { hair, carrier, local, rooted: (0..points).map(fade).collect() })
+}
+
+/// C lines, scene units, as C times P points relative to an origin.
+fn sampled(lines: &[Vec<Vec3>], origin: Vec3, points: usize) -> Vec<[f32; 3]> {
+    let sampled = |line: &Vec<Vec3>| {
+        let line: Vec<Vec3> = line.iter().map(|p| p - origin).collect();
+        curve::resample(&line, points)
     };
     lines.iter().flat_map(sampled).map(|p| [p.x as f32, p.y as f32, p.z as f32]).collect()
 }
@@ -313,6 +383,13 @@ impl<'a> Job<'a, '_> {
         let channel = rng::channel(&effect.key());
         let points = self.points;
         match effect {
+            Effect::Cluster => {
+                let c = layer.cluster.as_ref().expect("the layer has clusters");
+                let own = &self.look.clusters;
+                let line = drawn_lines(points, &self.out.position, &own.carrier, self.axes, &own.local);
+                let percent = self.param(run, effect, "percent", &c.percent);
+                gather(points, &own.hair, percent, &own.rooted, &line, &mut self.out.position);
+            }
             Effect::Clump(k) => self.clump(run, k, seed)?,
             Effect::Curl => {
                 let c = layer.curl.as_ref().expect("the layer has curls");

@@ -4,6 +4,7 @@
 mod areas;
 mod body;
 mod clumps;
+mod clusters;
 mod explain;
 mod guides;
 mod kept;

@@ -317,20 +317,19 @@ impl ExportFormat {
     }
 }
 
-/// Builds recipes from a project; `groom` and `shot` are the files' labels.
+/// Builds recipes from a project; `shot` is the label of its file.
 pub(super) struct Reader<'a> {
     pub project: &'a Project,
-    groom: String,
     shot: String,
 }
 
 impl<'a> Reader<'a> {
     pub(super) fn new(project: &'a Project) -> Self {
-        Reader { project, groom: project.label(&project.groom.path), shot: project.label(&project.shot.path) }
+        Reader { project, shot: project.label(&project.shot.path) }
     }
 
     pub(super) fn in_groom(&self, key: &str) -> String {
-        format!("{}: {key}", self.groom)
+        format!("{}: {key}", self.project.label(self.project.groom.file_of(key)))
     }
 
     pub(super) fn in_shot(&self, key: &str) -> String {
@@ -385,7 +384,7 @@ impl<'a> Reader<'a> {
         let layer = &self.project.groom.value.layer[i];
         let r = Recipe::new("instance/roots", version::ROOTS);
         let r = r.with(self.feature("density", &format!("layer[{i}].density"), &layer.density));
-        r.with(layer.on_off.iter().flat_map(|m| self.map(&format!("layer[{i}].on_off"), m)))
+        self.growth(r.with(layer.on_off.iter().flat_map(|m| self.map(&format!("layer[{i}].on_off"), m))))
     }
 
     /// What the column `part` of a layer reads of its guard hairs; nothing if it has none.

@@ -50,6 +50,45 @@ impl Reader<'_> {
         r
     }
 
+    /// What scalp space reads.
+    fn scalp(&self, mut r: Recipe) -> Recipe {
+        let s = &self.project.groom.value.scalp;
+        for (key, v) in [("centre", s.centre), ("up", s.up), ("front", s.front)] {
+            let name = format!("scalp.{key}");
+            r = v.into_iter().fold(r, |r, v| r.param(&name, format!("{v:?}"), self.in_groom(&name)));
+        }
+        r.with(s.coordinates.iter().flat_map(|m| self.map("scalp.coordinates", m)))
+    }
+
+    /// What says where hair grows.
+    pub(super) fn growth(&self, mut r: Recipe) -> Recipe {
+        let growth = &self.project.groom.value.scalp.growth;
+        if growth.is_empty() {
+            return r;
+        }
+        for (k, line) in growth.iter().enumerate() {
+            let name = format!("scalp.growth[{k}]");
+            r = r.param(&name, format!("{line:?}"), self.in_groom(&name));
+        }
+        self.scalp(r)
+    }
+
+    /// What clusters read.
+    pub(super) fn clusters(&self, r: Recipe) -> Recipe {
+        let groom = &self.project.groom.value;
+        let mut r = self.scalp(r);
+        let all = [
+            ("cluster", serde_json::to_value(&groom.cluster)),
+            ("cluster_edit", serde_json::to_value(&groom.cluster_edit)),
+        ];
+        for (key, value) in all {
+            for (name, value) in leaves(key, &value.expect("plain numbers and names")) {
+                r = r.param(&name, value, self.in_groom(&name));
+            }
+        }
+        r
+    }
+
     fn comb_fields(&self, mut r: Recipe, i: usize, c: &Comb) -> Recipe {
         let name = |key: &str| format!("comb[{i}].{key}");
         let mut add = |key: &str, value: Option<String>| {
@@ -71,9 +110,13 @@ impl Reader<'_> {
         add("space", c.space.map(|s| format!("{s:?}")));
         add("angle", c.angle.map(|x| x.to_string()));
         add("amount", c.amount.map(|x| x.to_string()));
+        add("level", c.level.map(|x| x.to_string()));
         add("value", c.value.map(|x| x.to_string()));
         for (key, map) in [("region", &c.region), ("map", &c.map)] {
             r = r.with(map.iter().flat_map(|m| self.map(&name(key), m)));
+        }
+        if c.kind == CombKind::Cluster {
+            r = self.clusters(r);
         }
         self.comb_guides(r, i, c)
     }

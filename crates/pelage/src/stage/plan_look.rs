@@ -11,6 +11,8 @@ use std::fmt::Display;
 /// A part of the look that acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effect {
+    /// Places in clusters.
+    Cluster,
     /// A level of clumps.
     Clump(usize),
     /// Curls.
@@ -27,7 +29,8 @@ impl Effect {
     /// True if it displaces along axes across the hair, which the skin carries.
     pub fn has_axes(self, project: &Project, i: usize) -> bool {
         match self {
-            Effect::Clump(k) => project.groom.value.layer[i].clump[k].curves.is_some(),
+            Effect::Clump(k) => project.groom.value.layer[i].clump[k].has_lines(),
+            Effect::Cluster => true,
             Effect::Curl | Effect::Wave(_) | Effect::Noise(_) => true,
             Effect::Wind => false,
         }
@@ -36,6 +39,7 @@ impl Effect {
     /// Its key below the layer's.
     pub fn key(self) -> String {
         match self {
+            Effect::Cluster => "cluster".to_owned(),
             Effect::Clump(k) => format!("clump[{k}]"),
             Effect::Curl => "curl".to_owned(),
             Effect::Wave(k) => format!("wave[{k}]"),
@@ -56,6 +60,7 @@ pub fn effects(project: &Project, i: usize) -> [Vec<Effect>; 2] {
     for operator in layer.order().into_iter().filter(|o| shot.look.has(*o)) {
         let mut add = |effect, simulated: bool| out[usize::from(!(simulated && every))].push(effect);
         match operator {
+            Operator::Cluster => layer.cluster.iter().for_each(|c| add(Effect::Cluster, c.simulate)),
             Operator::Clump => layer.clump.iter().enumerate().for_each(|(k, c)| add(Effect::Clump(k), c.simulate)),
             Operator::Curl => layer.curl.iter().for_each(|c| add(Effect::Curl, c.simulate)),
             Operator::Wave => layer.wave.iter().enumerate().for_each(|(k, w)| add(Effect::Wave(k), w.simulate)),
@@ -251,6 +256,10 @@ impl Reader<'_> {
         for (name, value) in by_hand {
             r = value.into_iter().fold(r, |r, v| r.param(name, v, self.in_groom(&format!("{at}.{name}"))));
         }
+        if let Some(level) = c.clusters {
+            r = r.param("clusters", level, self.in_groom(&format!("{at}.clusters")));
+            r = self.rest(self.clusters(r));
+        }
         if c.regions.is_some() && c.size.is_none() {
             let density = format!("layer[{i}].density.value");
             r = r.param("layer density", layer.density.value, self.in_groom(&density));
@@ -314,6 +323,7 @@ impl Reader<'_> {
                     }
                 }
             }
+            Effect::Cluster => r = self.rest(self.clusters(r)),
             Effect::Wave(k) => {
                 let map = layer.wave[k].map.as_ref();
                 r = r.with(map.iter().flat_map(|m| self.map_at(&format!("{key}.root"), &format!("{at}.map"), m)));
@@ -329,6 +339,11 @@ impl Reader<'_> {
         let mut out: Vec<(String, String)> = Vec::new();
         let mut add = |key: &str, value: &dyn Display| out.push((key.to_owned(), value.to_string()));
         match effect {
+            Effect::Cluster => {
+                let c = layer.cluster.as_ref().expect("the layer has clusters");
+                add("start", &c.start);
+                c.level.iter().for_each(|l| add("level", l));
+            }
             Effect::Clump(k) => {
                 let c = &layer.clump[k];
                 add("taper", &c.taper);

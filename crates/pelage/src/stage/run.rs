@@ -94,6 +94,8 @@ pub struct Runner<'a> {
     pub(super) sites: BTreeMap<usize, Rc<super::clumps::RestSites>>,
     pub(super) members: BTreeMap<(usize, usize), Rc<pelage_groom::look::member::Members>>,
     pub(super) looks: BTreeMap<(usize, bool), Rc<super::look::LayerLook>>,
+    /// Clusters of the groom.
+    pub(super) tree: Option<std::sync::Arc<pelage_groom::cluster::Tree>>,
     pub(super) barrier: Option<Rc<super::look::Barrier>>,
     /// Particles of emitters that have a file.
     pub(super) particles: BTreeMap<usize, Rc<Vec<pelage_groom::areas::Particle>>>,
@@ -147,6 +149,7 @@ impl<'a> Runner<'a> {
             sites: BTreeMap::new(),
             members: BTreeMap::new(),
             looks: BTreeMap::new(),
+            tree: None,
             barrier: None,
             particles: BTreeMap::new(),
             scene: None,
