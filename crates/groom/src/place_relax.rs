@@ -259,6 +259,14 @@ mod tests {
         let least = 0.95 * GAP * (s.topology.area.iter().sum::<f64>() / 280.0).sqrt();
         assert!(before.iter().filter(|p| gap(p) < least).count() > 10);
         assert!(after.iter().all(|p| gap(p) >= least));
+        // Nor does a crowd press them there, whose push on each is stronger than that of the border.
+        let middle = Vec3::new(-8.0, 0.5, 2.5).normalize() * 10.0;
+        let crowded = |p: &SurfacePoint| (s.mesh.point(p) - middle).norm() < 1.9 && gap(p) > 1.0;
+        let mut crowd: Vec<SurfacePoint> = random(&s, 20_000).into_iter().filter(crowded).take(100).collect();
+        assert!(crowd.len() == 100 && crowd.iter().all(|p| s.topology.chart[p.triangle as usize] == 1));
+        let least = 0.95 * GAP * (s.topology.area.iter().sum::<f64>() / 200.0).sqrt();
+        relax(&s.skin(), &s.bvh, &still, 10, &mut crowd);
+        assert!(crowd.iter().all(|p| gap(p) >= least));
     }
 
     /// The two sides of a flat body do not feel each other, however near they are.
