@@ -5,14 +5,8 @@ use pelage_geom::{Map, Wrap};
 
 fn groomed() -> (TestSkin, ControlHairs) {
     let s = TestSkin::new(24, 12, 0.5);
-    let settings = PlaceSettings {
-        placement: Placement::Grid { u: 5, v: 6 },
-        points: 6,
-        length: 3.0,
-        length_map: None,
-        partings: &[],
-        parting_spacing: 1.0,
-    };
+    let placement = Placement::Grid { u: 5, v: 6, even: false };
+    let settings = PlaceSettings { placement, points: 6, length: 3.0, ..PlaceSettings::default() };
     let (hairs, _, _) = place(&s.skin(), &s.bvh, &settings);
     (s, hairs)
 }

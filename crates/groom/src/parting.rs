@@ -28,7 +28,7 @@ pub struct PartingCounts {
 
 /// The straight way through one triangle, as weights of its corners.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Step {
+pub(crate) struct Step {
     triangle: u32,
     from: [f64; 3],
     to: [f64; 3],
@@ -97,6 +97,25 @@ fn along(step: &Step, f: f64) -> SurfacePoint {
     SurfacePoint { triangle: step.triangle, bary: [w[1] as f32, w[2] as f32] }
 }
 
+/// `count` points at equal steps of arc length along a way, the first and the last at its ends; one: its middle. None of
+/// an empty way.
+pub(crate) fn evenly(skin: &Skin, steps: &[Step], count: usize) -> Vec<SurfacePoint> {
+    let Some(last) = steps.last() else { return Vec::new() };
+    let lengths: Vec<f64> = steps.iter().map(|s| length(skin, s)).collect();
+    let total: f64 = lengths.iter().sum();
+    let (mut i, mut before) = (0, 0.0);
+    let place = |k: usize| {
+        let target = total * if count == 1 { 0.5 } else { k as f64 / (count - 1) as f64 };
+        while i + 1 < steps.len() && before + lengths[i] < target {
+            before += lengths[i];
+            i += 1;
+        }
+        let f = (target - before) / lengths[i].max(f64::MIN_POSITIVE);
+        if count > 1 && k + 1 == count { along(last, 1.0) } else { along(&steps[i], f.clamp(0.0, 1.0)) }
+    };
+    (0..count).map(place).collect()
+}
+
 /// Stations of a parting: its ends, every seam, and between them points evenly spaced by about `spacing`.
 fn stations(skin: &Skin, steps: &[Step], spacing: f64) -> Vec<Station> {
     let last = steps.len() - 1;
@@ -153,7 +172,7 @@ fn crossing(skin: &Skin, step: &Step) -> Option<Station> {
 /// A polyline near the skin as a way over it, and whether it was followed to its end. Its points move to the nearest
 /// points of the skin; between two of them the way is the cut of the plane through both that holds the mean of their
 /// normals.
-fn trace(skin: &Skin, bvh: &Bvh, line: &[Vec3]) -> (Vec<Step>, bool) {
+pub(crate) fn trace(skin: &Skin, bvh: &Bvh, line: &[Vec3]) -> (Vec<Step>, bool) {
     let mut out: Vec<Step> = Vec::new();
     // A little inside their triangles, so that the plane cuts them.
     let inward = |p: SurfacePoint| {
@@ -267,7 +286,7 @@ fn pair(plan: &mut Plan, root: SurfacePoint, parting: u32, border: bool) -> [u32
 }
 
 /// The point a fraction `f` along edge `i` of triangle `t`.
-fn on_edge(t: u32, i: usize, f: f64) -> SurfacePoint {
+pub(crate) fn on_edge(t: u32, i: usize, f: f64) -> SurfacePoint {
     let mut w = [0.0; 3];
     w[i] = 1.0 - f;
     w[(i + 1) % 3] = f;
@@ -333,8 +352,8 @@ mod tests {
     use crate::test_skin::TestSkin;
 
     fn settings<'a>(partings: &'a [Vec<Vec3>]) -> PlaceSettings<'a> {
-        let placement = Placement::Grid { u: 8, v: 8 };
-        PlaceSettings { placement, points: 4, length: 3.0, length_map: None, partings, parting_spacing: 1.0 }
+        let placement = Placement::Grid { u: 8, v: 8, even: false };
+        PlaceSettings { placement, length: 3.0, partings, ..PlaceSettings::default() }
     }
 
     /// Points on the sphere of radius 10 by longitude and latitude, degrees.

@@ -233,14 +233,8 @@ mod tests {
     const SETTINGS: PushUp = PushUp { step: 0.1, clearance: 0.05 };
 
     fn groomed(s: &TestSkin, length: f64) -> ControlHairs {
-        let settings = PlaceSettings {
-            placement: Placement::Grid { u: 6, v: 6 },
-            points: 8,
-            length,
-            length_map: None,
-            partings: &[],
-            parting_spacing: 1.0,
-        };
+        let placement = Placement::Grid { u: 6, v: 6, even: false };
+        let settings = PlaceSettings { placement, points: 8, length, ..PlaceSettings::default() };
         place(&s.skin(), &s.bvh, &settings).0
     }
 
