@@ -8,6 +8,7 @@ pub mod candidates;
 mod cells;
 pub mod chain;
 mod chart_cut;
+pub mod choose;
 pub mod cluster;
 pub mod comb;
 pub mod control;

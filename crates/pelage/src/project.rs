@@ -156,8 +156,9 @@ impl Project {
                 if !path.is_file() {
                     return Err(missing(&shot, "groom.file", &path).into());
                 }
-                let groom: Document<GroomFile> = Document::read_joined(&path)?;
+                let mut groom: Document<GroomFile> = Document::read_joined(&path)?;
                 groom.check()?;
+                groom.value.settle();
                 groom
             }
             None => Document::parse(&shot.path, CURVES_GROOM.to_owned())?,
@@ -287,7 +288,11 @@ impl Project {
             return ("control.length".to_owned(), own.clone());
         }
         let value = |i: usize| groom.layer[i].length.value;
-        let longest = (1..groom.layer.len()).fold(0, |best, i| if value(i) > value(best) { i } else { best });
+        // Lengths of hairs by hand are factors.
+        let grown = (0..groom.layer.len()).filter(|i| groom.layer[*i].hairs.is_empty());
+        let Some(longest) = grown.reduce(|best, i| if value(i) > value(best) { i } else { best }) else {
+            return ("control.length".to_owned(), Feature::constant(1.0));
+        };
         let length = Feature { noise: 0.0, map: None, ..groom.layer[longest].length.clone() };
         (format!("layer[{longest}].length"), length)
     }

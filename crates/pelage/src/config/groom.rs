@@ -6,7 +6,7 @@ use super::document::{ConfigError, Document, Fixed, exactly};
 use super::look::{Clump, Collision, Curl, Emitter, Noise, Operator, Wave, WindLook};
 use super::simulate::{Material, Target, check_material};
 use schemars::JsonSchema;
-use serde::{Deserialize, Deserializer};
+use serde::{Deserialize, Deserializer, Serialize};
 use std::path::PathBuf;
 
 /// Most points of a hair: a hundred turns of a curl with forty points each.
@@ -44,8 +44,15 @@ pub struct GroomFile {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Control {
-    /// Where they stand, besides one at every vertex of every chart's border.
+    /// Where they stand, besides one at every vertex of every chart's border, those along lines and those one by one.
+    #[serde(default)]
     pub placement: Placement,
+    /// Hairs along lines on the skin.
+    #[serde(default)]
+    pub line: Vec<ControlLine>,
+    /// Hairs one by one.
+    #[serde(default)]
+    pub hair: Vec<ControlHair>,
     /// Points of a control hair, the root included. Default: 4.
     #[serde(default = "four")]
     pub points: usize,
@@ -71,7 +78,37 @@ fn half() -> f64 {
     0.5
 }
 
-/// Where control hairs stand: exactly one of the three.
+/// Control hairs along a line on the skin.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ControlLine {
+    /// The line, on or near the rest skin, scene units.
+    #[serde(deserialize_with = "points")]
+    pub points: Vec<[f64; 3]>,
+    /// Hairs at equal steps along it on the skin, the first and the last at its ends.
+    pub count: usize,
+}
+
+/// A control hair by itself.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ControlHair {
+    /// Name, unique: for combing, and for layers of such hairs.
+    pub name: String,
+    /// Its root, on or near the rest skin, scene units.
+    #[serde(deserialize_with = "exactly")]
+    pub root: [f64; 3],
+    /// Its points after the root, at the rest pose, scene units. Default: straight up, as long as the others.
+    #[serde(default, deserialize_with = "some_points")]
+    pub points: Option<Vec<[f64; 3]>>,
+}
+
+/// True if `name` is one of `patterns`, which may end in `*`.
+pub fn is_named(name: &str, patterns: &[String]) -> bool {
+    patterns.iter().any(|p| p.strip_suffix('*').map_or(p == name, |start| name.starts_with(start)))
+}
+
+/// Where control hairs stand: one of the three, or none if there are others.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Placement {
@@ -80,8 +117,14 @@ pub struct Placement {
     /// Counts along u and along v, on every chart.
     #[serde(default, deserialize_with = "grid")]
     pub grid: Option<[usize; 2]>,
+    /// grid: equal steps along the skin instead of equal steps of u and v. Default: false.
+    #[serde(default)]
+    pub even: bool,
     /// Curves drawn elsewhere (USD, PLY or .hair), bound to the skin.
     pub curves: Option<PathBuf>,
+    /// per_cm2, grid: rounds in which hairs push each other apart; 30 even them out. Default: 0.
+    #[serde(default)]
+    pub relax: usize,
 }
 
 /// A line on the skin across which no hair mixes control hairs.
@@ -169,6 +212,11 @@ pub struct Feature {
 }
 
 impl Feature {
+    /// The same everywhere.
+    pub fn constant(value: f64) -> Feature {
+        constant(value)
+    }
+
     /// Its map.
     pub fn map(&self) -> Option<MapRef> {
         self.map.clone().map(|map| MapRef { map, channel: self.channel, wrap: self.wrap })
@@ -275,18 +323,44 @@ fn thicker() -> f64 {
     1.6
 }
 
+/// Which of the three control hairs around it a hair follows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum GuideChoice {
+    /// All three, by their weights.
+    #[default]
+    Blend,
+    /// The one of the largest weight.
+    Nearest,
+    /// One at random, as probable as its weight is large: copies of it.
+    Copy,
+}
+
 /// A layer of hair.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Layer {
     /// Name, unique; names the layer's ids and its primitive in exported files.
     pub name: String,
-    /// Hairs per square centimetre.
+    /// Names of control hairs (or beginnings of names, `whisker*`) that are the hairs of this layer, instead of hairs of a
+    /// density: whiskers, lashes.
+    #[serde(default)]
+    pub hairs: Vec<String>,
+    /// Hairs per square centimetre. Required without `hairs`.
+    #[serde(default = "unsaid")]
     pub density: Feature,
     /// Map that turns areas off: multiplies the density.
     pub on_off: Option<MapRef>,
-    /// Length, scene units.
+    /// Length, scene units; with `hairs`, a factor on that of the control hairs. Required without them.
+    #[serde(default = "unsaid")]
     pub length: Feature,
+    /// Which of the three control hairs around it a hair follows. Default: "blend".
+    #[serde(default)]
+    pub guides: GuideChoice,
+    /// Follow control hairs as seen from the skin: their directions turn with it from their roots to the hair's. Default:
+    /// false, directions in space.
+    #[serde(default)]
+    pub root_frames: bool,
     /// Render width. Default: 80 micrometres.
     #[serde(default = "default_width")]
     pub width: WidthFeature,
@@ -328,6 +402,11 @@ pub struct Layer {
     pub order: Option<Vec<Operator>>,
 }
 
+/// Stands for a feature that is not given, until the layer is checked.
+fn unsaid() -> Feature {
+    constant(f64::NAN)
+}
+
 fn default_width() -> WidthFeature {
     let Feature { value, map, channel, wrap, noise } = constant(80.0);
     WidthFeature { value, tip: None, profile: None, map, channel, wrap, noise }
@@ -343,6 +422,18 @@ fn default_color() -> ColorFeature {
 
 pub(super) fn constant(value: f64) -> Feature {
     Feature { value, map: None, channel: Channel::Grey, wrap: WrapMode::Clamp, noise: 0.0 }
+}
+
+impl GroomFile {
+    /// Gives features that a checked file does not say their values: no density and a factor of 1 for hairs by hand.
+    pub fn settle(&mut self) {
+        for l in self.layer.iter_mut().filter(|l| !l.hairs.is_empty()) {
+            l.density = constant(0.0);
+            if l.length.value.is_nan() {
+                l.length = constant(1.0);
+            }
+        }
+    }
 }
 
 impl Document<GroomFile> {
@@ -387,9 +478,39 @@ impl Document<GroomFile> {
         let c = &self.value.control;
         let p = &c.placement;
         let given = [p.per_cm2.is_some(), p.grid.is_some(), p.curves.is_some()];
-        if given.iter().filter(|g| **g).count() != 1 {
-            let help = "give exactly one of per_cm2, grid, curves";
+        let count = given.iter().filter(|g| **g).count();
+        if count > 1 || count == 0 && c.line.is_empty() && c.hair.is_empty() {
+            let help = "give one of per_cm2, grid, curves, or add a [[control.line]] or a [[control.hair]]";
             return Err(self.error("control.placement", "does not say where control hairs stand", help));
+        }
+        self.keys(
+            "control.placement",
+            &[
+                ("even", p.even, p.even && p.grid.is_some()),
+                ("relax", p.relax > 0, p.relax > 0 && p.curves.is_none() && count > 0),
+            ],
+        )?;
+        if p.relax > 10_000 {
+            return Err(self.error("control.placement.relax", "is out of range", "rounds go from 0 to 10000"));
+        }
+        for (i, l) in c.line.iter().enumerate() {
+            let at = format!("control.line[{i}]");
+            self.line(&format!("{at}.points"), Some(&l.points))?;
+            if !(1..=100_000).contains(&l.count) {
+                return Err(self.error(&format!("{at}.count"), "is out of range", "counts go from 1 to 100000"));
+            }
+        }
+        for (i, h) in c.hair.iter().enumerate() {
+            let at = format!("control.hair[{i}]");
+            if h.name.is_empty() || h.name.contains('*') || c.hair[..i].iter().any(|o| o.name == h.name) {
+                let help = "name every hair differently, without *";
+                return Err(self.error(&format!("{at}.name"), "is empty, used twice or a pattern", help));
+            }
+            let line: Vec<[f64; 3]> = [h.root].into_iter().chain(h.points.iter().flatten().copied()).collect();
+            match h.points {
+                Some(_) => self.line(&format!("{at}.points"), Some(&line))?,
+                None => h.root.into_iter().try_for_each(|x| self.within(&format!("{at}.root"), x, -1e9, 1e9))?,
+            }
         }
         if let Some(d) = p.per_cm2 {
             self.within("control.placement.per_cm2", d, 0.0, 1e4)?;
@@ -406,8 +527,24 @@ impl Document<GroomFile> {
     }
 
     fn check_layer(&self, key: &str, l: &Layer) -> Result<(), ConfigError> {
-        self.feature(&format!("{key}.density"), &l.density, 1e5)?;
-        self.feature(&format!("{key}.length"), &l.length, 1e6)?;
+        let by_hand = !l.hairs.is_empty();
+        self.keys(
+            key,
+            &[("density", !l.density.value.is_nan(), !by_hand), ("length", by_hand || !l.length.value.is_nan(), true)],
+        )?;
+        for pattern in &l.hairs {
+            if !self.value.control.hair.iter().any(|h| is_named(&h.name, std::slice::from_ref(pattern))) {
+                let help = "name a [[control.hair]] of this file, or the beginning of some with a *";
+                return Err(self.error(&format!("{key}.hairs"), format!("there is no hair `{pattern}`"), help));
+            }
+        }
+        if by_hand {
+            let length = if l.length.value.is_nan() { &constant(1.0) } else { &l.length };
+            self.feature(&format!("{key}.length"), length, 1e3)?;
+        } else {
+            self.feature(&format!("{key}.density"), &l.density, 1e5)?;
+            self.feature(&format!("{key}.length"), &l.length, 1e6)?;
+        }
         self.feature(&format!("{key}.width"), &l.width.feature(), 1e6)?;
         self.check_width(&format!("{key}.width"), &l.width)?;
         self.feature(&format!("{key}.opacity"), &l.opacity, 1.0)?;

@@ -393,7 +393,7 @@ impl Document<GroomFile> {
         self.within(&format!("{key}.core"), e.core, 0.0, 1e9)
     }
 
-    fn line(&self, key: &str, points: Option<&Vec<[f64; 3]>>) -> Result<(), ConfigError> {
+    pub(super) fn line(&self, key: &str, points: Option<&Vec<[f64; 3]>>) -> Result<(), ConfigError> {
         let Some(points) = points else { return Ok(()) };
         let apart = points.windows(2).any(|w| w[0] != w[1]);
         if points.len() < 2 || !apart || !points.iter().flatten().all(|x| x.is_finite()) {

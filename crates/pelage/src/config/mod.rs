@@ -20,7 +20,8 @@ pub use cluster::{Cluster, ClusterEdit, ClusterEditKind, ClusterLook, MOST_CLUST
 pub use comb::{Comb, CombKind, Side, Space};
 pub use document::{ConfigError, Document};
 pub use groom::{
-    Channel, ColorFeature, Control, Feature, GroomFile, Guard, Layer, MOST_POINTS, MapRef, Parting, Placement,
+    Channel, ColorFeature, Control, ControlHair, ControlLine, Feature, GroomFile, Guard, GuideChoice, Layer,
+    MOST_POINTS, MapRef, Parting, Placement, is_named,
 };
 pub use groom::{WidthFeature, WrapMode};
 pub use guides::{Ball, Element, ElementKind, Falloff, Orientation, Panels, Plane, Primitive, Region, Shear};

@@ -16,7 +16,7 @@ use pelage_groom::comb::{CombKind, CombOp, DirectionSpace, Guides, comb};
 use pelage_groom::control::{self, ControlHairs, PartingPiece, Sites};
 use pelage_groom::field::lengths::Shear;
 use pelage_groom::flow::trace::{Guard, Start};
-use pelage_groom::place::{PlaceSettings, Placement, place};
+use pelage_groom::place::{Line, PlaceSettings, Placement, Single, place};
 use pelage_groom::push_up::{PushUp, push_up};
 use std::rc::Rc;
 
@@ -131,13 +131,29 @@ fn place_hairs(run: &mut Runner<'_>) -> Result<(ControlHairs, Sites, Counts), Er
     // Partings and drawn hairs keep the distance that the density asks for, or half a centimetre.
     let half_cm = 0.5 / run.project.cm2_per_unit2().sqrt();
     let spacing = if per_unit2 > 0.0 { (0.5 / per_unit2.sqrt()).min(2.0 * half_cm) } else { half_cm };
-    let placement = match (&drawn, p.grid) {
-        (Some(drawn), _) => Placement::Curves { drawn, spacing: 0.1 * half_cm },
-        (None, Some([u, v])) => Placement::Grid { u, v },
-        (None, None) => Placement::PerArea { density: per_unit2, root: &root },
+    let placement = match (&drawn, p.grid, p.per_cm2) {
+        (Some(drawn), ..) => Placement::Curves { drawn, spacing: 0.1 * half_cm },
+        (None, Some([u, v]), _) => Placement::Grid { u, v, even: p.even },
+        (None, None, Some(_)) => Placement::PerArea { density: per_unit2, root: &root },
+        (None, None, None) => Placement::None,
     };
+    let points = |p: &[[f64; 3]]| p.iter().map(|q| Vec3::from(*q)).collect::<Vec<_>>();
+    let lines: Vec<Line> =
+        groom.control.line.iter().map(|l| Line { points: points(&l.points), count: l.count }).collect();
+    let single: Vec<Single> = groom
+        .control
+        .hair
+        .iter()
+        .map(|h| Single {
+            at: h.root.into(),
+            line: h.points.as_ref().map(|p| [vec![Vec3::from(h.root)], points(p)].concat()),
+        })
+        .collect();
     let settings = PlaceSettings {
         placement,
+        lines: &lines,
+        single: &single,
+        relax: p.relax,
         points: groom.control.points,
         length: length.value,
         length_map: length_map.as_ref(),
@@ -150,6 +166,8 @@ fn place_hairs(run: &mut Runner<'_>) -> Result<(ControlHairs, Sites, Counts), Er
         ("control hairs", hairs.len()),
         ("control hairs on chart borders", c.border),
         ("control hairs on partings", c.partings.hairs),
+        ("control hairs on lines", c.on_lines),
+        ("control hairs one by one", c.single),
         ("control hairs too near to others", c.dropped),
         ("drawn hairs without length", c.skipped_short),
     ] {
@@ -159,6 +177,15 @@ fn place_hairs(run: &mut Runner<'_>) -> Result<(ControlHairs, Sites, Counts), Er
         if !sites.partings.iter().any(|p| p.parting as usize == i) {
             run.warnings.push(format!("parting {} has no length on the skin and does nothing", parting.name));
         }
+    }
+    if c.lines_cut_short + c.lines_skipped > 0 {
+        let n = c.lines_cut_short + c.lines_skipped;
+        run.warnings
+            .push(format!("{n} lines of control hairs stop at a gap or border of the skin, or have no length on it"));
+    }
+    if c.single_straight > 0 {
+        run.warnings
+            .push(format!("{} control hairs have points without a length and stand straight", c.single_straight));
     }
     if c.partings.cut_short > 0 {
         run.warnings.push(format!("{} partings stop at a gap or border of the skin", c.partings.cut_short));

@@ -173,7 +173,8 @@ fn primitive(p: &Primitive) -> field::Primitive {
     }
 }
 
-fn region(r: &Region) -> field::Region {
+/// A part of space.
+pub(super) fn region(r: &Region) -> field::Region {
     match (r.centre, r.radii) {
         (Some(centre), Some(radii)) => {
             field::Region::Ellipsoid { centre: centre.into(), rotation: turned(r.turn), radii: radii.into() }

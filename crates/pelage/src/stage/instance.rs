@@ -4,12 +4,13 @@ use super::plan_kept::hairs_of;
 use super::run::{Counts, Runner};
 use super::skin::Texel;
 use super::tables::{decode, encode, id_columns, ids_of, root_columns, roots_of, table, vector_columns, vectors_of};
-use super::{Skin, What, candidate_density, clusters, groom, kept, layer_seed};
+use super::{Skin, What, candidate_density, clusters, groom, guides, kept, layer_seed};
 use crate::Error;
-use crate::config::{Feature, Guard};
+use crate::config::{Feature, Guard, GuideChoice, is_named};
 use crate::format::ply::Column;
 use pelage_geom::{SurfacePoint, TiledMap, rng};
-use pelage_groom::candidates::{Candidates, candidates as find_candidates};
+use pelage_groom::candidates::{Candidates, candidates as find_candidates, strand_id};
+use pelage_groom::choose::{self, respect};
 use pelage_groom::instance::{Density, Feature as FeatureSource, Roots, colour_column, feature_column, scale_guards};
 use pelage_groom::instance::{roots as find_roots, weights as find_weights};
 use pelage_groom::keep::kept as kept_roots;
@@ -117,7 +118,38 @@ pub(super) fn density(run: &mut Runner<'_>, i: usize) -> Result<LayerDensity, Er
     Ok(LayerDensity { value: layer.density.value * run.project.cm2_per_unit2(), map, on_off })
 }
 
+/// Control hairs that are the hairs of a layer, in the order of the file; empty for a layer of a density.
+fn by_hand(run: &mut Runner<'_>, i: usize) -> Result<Vec<u32>, Error> {
+    let groom = &run.project.groom.value;
+    let wanted = &groom.layer[i].hairs;
+    if wanted.is_empty() {
+        return Ok(Vec::new());
+    }
+    let hairs = groom::combed(run)?;
+    let mut found: Vec<(u32, u32)> = hairs.single.iter().enumerate().map(|(h, s)| (*s, h as u32)).collect();
+    found.retain(|(s, _)| groom.control.hair.get(*s as usize).is_some_and(|h| is_named(&h.name, wanted)));
+    found.sort_unstable();
+    Ok(found.into_iter().map(|f| f.1).collect())
+}
+
+/// Roots of such a layer; a hair is named by its place among the control hairs of the file.
+fn roots_by_hand(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
+    let (skin, hairs, found) = (groom::skin(run)?, groom::combed(run)?, by_hand(run, i)?);
+    let seed = layer_seed(&run.project.groom.value.layer[i].name);
+    let of = |h: &u32| hairs.root[*h as usize];
+    Ok(Roots {
+        root: found.iter().map(of).collect(),
+        uv: found.iter().map(|h| groom::view(&skin).uv(&of(h))).collect(),
+        chart: found.iter().map(|h| skin.topology.chart[of(h).triangle as usize]).collect(),
+        id: found.iter().map(|h| strand_id(seed, hairs.single[*h as usize])).collect(),
+    })
+}
+
 fn grow(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
+    if !run.project.groom.value.layer[i].hairs.is_empty() {
+        let found = roots_by_hand(run, i)?;
+        return kept_roots_of(run, i, found);
+    }
     let skin = groom::skin(run)?;
     let mut candidates = candidates(run, i)?;
     let layer = &run.project.groom.value.layer[i];
@@ -136,6 +168,11 @@ fn grow(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
     if !growing.is_empty() {
         found = kept_roots(&found, &growing);
     }
+    kept_roots_of(run, i, found)
+}
+
+/// Writes roots to the cache.
+fn kept_roots_of(run: &mut Runner<'_>, i: usize, found: Roots) -> Result<Roots, Error> {
     let layer = &run.project.groom.value.layer[i];
     let counts = Counts::from([
         ("hairs".to_owned(), found.id.len() as u64),
@@ -179,16 +216,42 @@ pub fn weights(run: &mut Runner<'_>, i: usize) -> Result<Weights, Error> {
     if let Some(found) = run.fetch(what).and_then(|e| decode_weights(e.payload.first()?)) {
         return Ok(found);
     }
+    let own = by_hand(run, i)?;
+    if !own.is_empty() {
+        // Hairs may have been left out.
+        let (control, roots) = (groom::combed(run)?, roots(run, i)?);
+        let place = |id: &u64| own.iter().position(|h| u64::from(control.single[*h as usize]) == id & 0xffff_ffff);
+        let hair =
+            roots.id.iter().map(|id| [own[place(id).expect("hairs of the layer are control hairs")]; 3]).collect();
+        return keep_weights(run, what, Counts::new(), hair, vec![[1.0, 0.0, 0.0]; roots.id.len()]);
+    }
     let skin = groom::skin(run)?;
     let sites = groom::placed(run)?;
     let roots = roots(run, i)?;
     let triangulation = triangulate(&sites, &mirrored_charts(&skin.mesh, &skin.topology));
-    let found = find_weights(&roots, &triangulation);
+    let mut found = find_weights(&roots, &triangulation);
+    let groom = &run.project.groom.value;
+    let dividers: Vec<_> = groom.comb.iter().flat_map(|c| &c.divider).map(guides::region).collect();
+    let layer = &groom.layer[i];
+    let (choice, seed) = (layer.guides, u64::from(layer_seed(&layer.name)));
+    let mut divided = 0;
+    if !dividers.is_empty() {
+        let control = groom::combed(run)?;
+        let at = |roots: &[SurfacePoint]| roots.iter().map(|p| skin.mesh.point(p)).collect::<Vec<_>>();
+        divided = respect(&dividers, &at(&roots.root), &at(&control.root), &mut found.hair, &mut found.weight);
+    }
+    let choice = match choice {
+        GuideChoice::Blend => choose::Guides::Blend,
+        GuideChoice::Nearest => choose::Guides::Nearest,
+        GuideChoice::Copy => choose::Guides::Copy,
+    };
+    choose::choose(choice, &roots.id, seed, &mut found.hair, &mut found.weight);
     let c = triangulation.counts;
     let counts = Counts::from(
         [
             ("hairs outside the control triangulation", found.outside),
             ("hairs in charts without control hairs", found.orphans),
+            ("hairs beside a divider", divided),
             ("control sites at the place of another", c.duplicates),
             ("control edges left out because they cross", c.crossing),
             ("charts with an open outline", c.open_outlines),
@@ -196,13 +259,23 @@ pub fn weights(run: &mut Runner<'_>, i: usize) -> Result<Weights, Error> {
         ]
         .map(|(name, n)| (name.to_owned(), n as u64)),
     );
-    let index: [Vec<u32>; 3] = std::array::from_fn(|k| found.hair.iter().map(|h| h[k]).collect());
+    keep_weights(run, what, counts, found.hair, found.weight)
+}
+
+fn keep_weights(
+    run: &mut Runner<'_>,
+    what: What,
+    counts: Counts,
+    hair: Vec<[u32; 3]>,
+    weight: Vec<[f32; 3]>,
+) -> Result<Weights, Error> {
+    let index: [Vec<u32>; 3] = std::array::from_fn(|k| hair.iter().map(|h| h[k]).collect());
     let names = ["a", "b", "c"];
     let mut columns: Vec<(&str, Column)> = names.into_iter().zip(index.map(Column::U32)).collect();
-    columns.extend(vector_columns(["wa", "wb", "wc"], &found.weight));
+    columns.extend(vector_columns(["wa", "wb", "wc"], &weight));
     let file = encode("control hairs a, b, c of every hair and their weights", &[table("hair", columns)]);
     run.keep(what, counts, &[("data.ply", &file)])?;
-    Ok((found.hair, found.weight))
+    Ok((hair, weight))
 }
 
 fn decode_weights(bytes: &[u8]) -> Option<Weights> {
@@ -257,6 +330,13 @@ pub(super) fn feature(run: &mut Runner<'_>, what: What, i: usize, roots: &Roots)
     };
     let seed = u64::from(layer_seed(&layer.name));
     let mut values = feature_column(roots, &source, seed);
+    if name == "length" && !run.project.groom.value.layer[i].hairs.is_empty() {
+        let (control, own) = (groom::combed(run)?, by_hand(run, i)?);
+        for (value, id) in values.iter_mut().zip(&roots.id) {
+            let hair = own.iter().find(|h| u64::from(control.single[**h as usize]) == id & 0xffff_ffff);
+            *value *= hair.map_or(0.0, |h| control.length(*h as usize)) as f32;
+        }
+    }
     if let Some((share, factor)) = guard {
         scale_guards(&mut values, roots, share, factor, seed);
     }

@@ -94,7 +94,8 @@ fn choose(run: &mut Runner<'_>, i: usize, all: &Roots, counts: &mut Counts) -> R
         if skip.camera {
             (0..n).for_each(|h| why[h] = why[h].or(unseen(found[h].0)));
         }
-        if let Some(lod) = skip.lod {
+        // Hairs by hand are of no density.
+        if let Some(lod) = skip.lod.filter(|_| project.groom.value.layer[i].hairs.is_empty()) {
             let density = instance::density(run, i)?;
             for (h, share) in shares(all, &density.view(), skin.area()).into_iter().enumerate() {
                 let part = (f64::from(found[h].1) / lod).clamp(LEAST, 1.0) as f32;

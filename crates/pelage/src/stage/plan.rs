@@ -208,13 +208,18 @@ impl Plan {
                 let recipe = Recipe::new(&format!("instance/{part}"), version::COLUMN);
                 r.guard(i, part, recipe.with(r.feature(part, &format!("layer[{i}].{part}"), f)))
             };
-            add(What::Candidates(i), "candidates", r.candidates(i), &[]);
-            add(What::Roots(i), "roots", r.roots(i), &[What::Candidates(i)]);
+            // Control hairs that are hairs, or candidates that a density lets grow.
+            if layer.hairs.is_empty() {
+                add(What::Candidates(i), "candidates", r.candidates(i), &[]);
+                add(What::Roots(i), "roots", r.roots(i), &[What::Candidates(i)]);
+            } else {
+                add(What::Roots(i), "roots", r.roots_by_hand(i), &[What::Comb]);
+            }
             let hairs = hairs_of(project, i);
             if hairs == What::Kept(i) {
                 add(hairs, "kept", r.kept(i), &[What::Roots(i)]);
             }
-            add(What::Weights(i), "weights", Recipe::new("instance/weights", version::WEIGHTS), &[What::Place, hairs]);
+            add(What::Weights(i), "weights", r.weights(i), &[What::Place, hairs]);
             add(What::Length(i), "length", column("length", &layer.length), &[hairs]);
             add(What::Width(i), "width", column("width", &layer.width.feature()), &[hairs]);
             add(What::Opacity(i), "opacity", column("opacity", &layer.opacity), &[hairs]);
@@ -378,6 +383,35 @@ impl<'a> Reader<'a> {
         let r = self.unit(self.rest(Recipe::new("instance/candidates", version::CANDIDATES)));
         let r = r.param("seed", layer_seed(&layer.name), format!("{at}.name"));
         r.param("per_cm2", candidate_density(layer.density.value), format!("{at}.density.value (candidates)"))
+    }
+
+    /// What decides which control hairs the hairs of a layer follow, besides where they stand.
+    fn weights(&self, i: usize) -> Recipe {
+        let groom = &self.project.groom.value;
+        let mut r = Recipe::new("instance/weights", version::WEIGHTS);
+        for (k, c) in groom.comb.iter().enumerate().filter(|(_, c)| !c.divider.is_empty()) {
+            let at = format!("comb[{k}].divider");
+            r = r.param(&at, serde_json::to_string(&c.divider).expect("plain numbers"), self.in_groom(&at));
+        }
+        let layer = &groom.layer[i];
+        let at = |key: &str| self.in_groom(&format!("layer[{i}].{key}"));
+        if layer.guides == GuideChoice::Copy {
+            r = r.param("seed", layer_seed(&layer.name), at("name"));
+        }
+        match layer.guides {
+            GuideChoice::Blend => r,
+            other => r.param("guides", format!("{other:?}").to_lowercase(), at("guides")),
+        }
+    }
+
+    fn roots_by_hand(&self, i: usize) -> Recipe {
+        let layer = &self.project.groom.value.layer[i];
+        let at = self.in_groom(&format!("layer[{i}]"));
+        let r =
+            Recipe::new("instance/roots", version::ROOTS).param("seed", layer_seed(&layer.name), format!("{at}.name"));
+        let r = r.param("hairs", format!("{:?}", layer.hairs), format!("{at}.hairs"));
+        let names: Vec<&String> = self.project.groom.value.control.hair.iter().map(|h| &h.name).collect();
+        r.param("names", format!("{names:?}"), self.in_groom("control.hair"))
     }
 
     fn roots(&self, i: usize) -> Recipe {

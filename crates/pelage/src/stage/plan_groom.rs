@@ -17,6 +17,21 @@ impl Reader<'_> {
         if let Some([u, v]) = p.grid {
             r = r.param("grid", format!("{u} x {v}"), format!("{at}.grid"));
         }
+        if p.even {
+            r = r.param("even", true, format!("{at}.even"));
+        }
+        if p.relax > 0 {
+            r = r.param("relax", p.relax, format!("{at}.relax"));
+        }
+        let more = [
+            ("control.line", serde_json::to_value(&control.line)),
+            ("control.hair", serde_json::to_value(&control.hair)),
+        ];
+        for (key, value) in more {
+            for (name, value) in leaves(key, &value.expect("plain numbers and names")) {
+                r = r.param(&name, value, self.in_groom(&name));
+            }
+        }
         if let Some(drawn) = &self.project.drawn {
             r = r.file("curves", &drawn.hash, drawn.label.clone());
         }
