@@ -265,7 +265,7 @@ fn only_the_hairs_that_are_named_are_combed() {
     let (s, mut hairs) = groomed();
     (hairs.single[3], hairs.single[20], hairs.single[21]) = (0, 1, 2);
     let before = hairs.clone();
-    for (only, combed) in [(&[][..], &[][..]), (&[2, 0], &[3, 21]), (&[pelage_geom::NONE], &[])] {
+    for (only, combed) in [(&[][..], &[][..]), (&[2, 0], &[3, 21]), (&[NONE], &[])] {
         let mut hairs = before.clone();
         let named = CombOp { only: Some(only), ..op(curve(f64::INFINITY, 1.0, 0.0)) };
         let counts = comb(&s.skin(), &[], &[named], &mut hairs);

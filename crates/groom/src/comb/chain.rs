@@ -2,8 +2,8 @@
 //!
 //! The inverse kinematics are damped least squares (Wampler 1986) over the directions of the segments: each step turns them
 //! all by the least amount, in the sum of squares, that brings the tip to its target to first order. That gets there also
-//! where the hair is nearly straight, at which methods that go from joint to joint slow down: at 99 % of its length FABRIK
-//! is still 1e-3 of the length off after 200 passes.
+//! where the hair is nearly straight, at which methods that go from joint to joint slow down: pulled to 99.9 % of their
+//! length, chains of 5 to 30 segments are still up to 1e-3 to 5e-3 of it off after 200 passes of FABRIK.
 
 use super::{CombCounts, Hair, Handle, arc, influence, rebuild, rotate};
 use crate::control::{ControlHairs, to_local, vec3};
@@ -239,7 +239,6 @@ mod tests {
 
     #[test]
     fn the_tip_gets_to_all_that_is_in_reach() {
-        let mut worst: f64 = 0.0;
         for n in [2, 3, 5, 11, 30] {
             for (i, bend) in [0.0, 1e-4, 1.1e-3, 1e-2, 0.3, 2.0].iter().cycle().take(36).enumerate() {
                 let seed = (100 * n + i) as u64;
@@ -253,13 +252,11 @@ mod tests {
                     let mut direction = start.clone();
                     bring_tip(&length, &mut direction, target);
                     let error = (tip(&length, &direction) - target).norm() / whole;
-                    assert!(error < 1e-6, "{n} {bend} {part} {i}: {error}");
-                    worst = worst.max(error);
+                    assert!(error < 2e-9, "{n} {bend} {part} {i}: {error}");
                     assert!(direction.iter().all(|d| (d.norm() - 1.0).abs() < 1e-12));
                 }
             }
         }
-        println!("worst {worst:.1e}");
     }
 
     #[test]
@@ -305,7 +302,7 @@ mod tests {
         let frame = s.skin().frame(&hairs.root[40]);
         let target = frame.origin + to_world(&frame, Vec3::new(1.2, -0.9, 1.1));
         let turn = vec![(0, Vec3::y() * 30.0)];
-        let reach = |turn| chain(Handle::Single(7), turn, Some(target), 5.0);
+        let reach = |turn| chain(Handle::Single(7), turn, Some(target), 10.0);
         let counts = comb(&s.skin(), &[], &[op(reach(turn))], &mut hairs);
         assert!(counts[0].combed > 1);
         assert!((tip_in_space(&s.skin(), &hairs, 40) - target).norm() < 1e-6);
@@ -340,7 +337,7 @@ mod tests {
         let skin = s.skin();
         let at: Vec<Vec3> = hairs.root.iter().map(|p| skin.frame(p).origin).collect();
         let turn = vec![(0, Vec3::new(10.0, 40.0, -20.0)), (3, Vec3::z() * 70.0)];
-        let kind = || chain(Handle::Nearest(at[30]), turn.clone(), Some(at[30] + Vec3::new(1.0, 1.5, 0.5)), 8.0);
+        let kind = || chain(Handle::Nearest(at[30]), turn.clone(), Some(at[30] + Vec3::new(1.0, 1.5, 0.5)), 14.0);
         let counts = comb(&skin, &[], &[op(kind())], &mut hairs);
         let (mut full, mut faded, mut far) = (0, 0, 0);
         let axis_angle = |h: usize, c: &ControlHairs, k: usize| {
@@ -349,11 +346,11 @@ mod tests {
         };
         for h in 0..hairs.len() {
             let distance = (at[h] - at[30]).norm();
-            let a = influence(distance, 8.0, 0.5);
-            if distance >= 8.0 {
+            let a = influence(distance, 14.0, 0.5);
+            if distance >= 14.0 {
                 assert_eq!(hairs.hair(h), before.hair(h));
                 far += 1;
-            } else if distance <= 4.0 {
+            } else if distance <= 7.0 {
                 assert_eq!(hairs.hair(h), hairs.hair(30));
                 full += 1;
             } else {
