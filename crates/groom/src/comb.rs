@@ -1,20 +1,24 @@
 //! Combing: a list of operations that turn and scale the segments of control hairs on the rest skin.
 //!
 //! After "Course notes 2003, A production pipeline for hair", §3.2: combing direction curves, degree of bending and
-//! curvature, region of influence with a falloff. An operation never shortens a segment except [`CombKind::Length`] and [`CombKind::Cut`]:
-//! directions change, the hair is built up again from its root.
+//! curvature, region of influence with a falloff; §5: a chain over a control hair. An operation never changes the length of
+//! a segment except [`CombKind::Length`], [`CombKind::Cut`] and [`CombKind::Mirror`]: directions change, the hair is built up
+//! again from its root.
 //!
 //! With `a` the amount of an operation at a hair (its weight, region map, falloff and bend multiplied), segment k turns by
 //! the fraction `a * profile(s)` of the way to its target, where `s` runs from 0 at the first segment to 1 at the last
 //! (by length before the segment) and `profile(s) = 1 - c + c s` for curvature `c`: 0 tilts the whole hair at the root, 1
 //! leaves the root as it is and bends the tip.
 
+mod chain;
+mod mirror;
+
 use crate::control::{ControlHairs, Skin, to_local, to_world, vec3};
 use crate::field::lengths::{Shear, Sphere};
 use crate::flow::trace::{Lines, Start};
 use crate::flow::trim::cut;
 use pelage_geom::curve::{closest_on_polyline, length as polyline_length};
-use pelage_geom::{Frame, TiledMap, Vec3};
+use pelage_geom::{Frame, NONE, TiledMap, Vec3};
 use rayon::prelude::*;
 
 /// Elevation over the root's tangent plane that a laid-down hair keeps, radians (2 degrees). At 0 rounding puts half of
@@ -36,6 +40,8 @@ pub struct CombOp<'a> {
     pub region: Option<&'a TiledMap>,
     /// Only the hairs on one side of a parting: (index of the parting, +1 left or -1 right).
     pub side: Option<(u32, i8)>,
+    /// Only those of the hairs placed one by one ([`ControlHairs::single`]); an empty list is none of all hairs.
+    pub only: Option<&'a [u32]>,
 }
 
 /// Lines from the roots of all hairs, each as long as its hair and of as many points, scene space: a field that is traced, a
@@ -118,6 +124,44 @@ pub enum CombKind<'a> {
         /// Map multiplied onto the factor.
         map: Option<&'a TiledMap>,
     },
+    /// Moves a control hair and its neighbours as a chain, by forward and then inverse kinematics (same course notes, §5).
+    /// Segment k of a neighbour makes in its own root frame the turn that segment k of the handle makes in that of its root,
+    /// from its direction before to that after, without twist. Without such a handle nothing is done.
+    Chain {
+        /// The hair that is moved.
+        handle: Handle,
+        /// Forward kinematics, in this order: (joint, rotation vector). All segments from the joint on (0 is the root) turn
+        /// about the vector by its length in degrees; coordinates along N, dU, N x dU of the root. A joint beyond the last
+        /// segment turns nothing.
+        turn: Vec<(usize, Vec3)>,
+        /// Inverse kinematics, after the turns: where the handle's tip goes, rest scene space. The hair points straight at
+        /// what is out of its reach.
+        reach: Option<Vec3>,
+        /// Distance of a root from the handle's root where its influence ends, scene units; infinite for everywhere. The
+        /// handle itself moves whatever the radius.
+        radius: f64,
+        /// Part of the radius over which influence fades, as for a direction curve.
+        falloff: f64,
+    },
+    /// Gives hairs behind a plane the mirrored shape of those in front: the blend of the nearest to the mirrored root, or the
+    /// very hair that stands there (within 1e-6 of the mesh's diagonal), put at the hair's own root. Directions, lengths of
+    /// segments and what hairs were cut to are carried over. A hair on a side of a parting takes hairs of the other side or
+    /// of none, if there are any: partings run in the same sense on both halves. Hairs in front and on the plane stay.
+    Mirror {
+        /// A point of the plane, rest scene space.
+        point: Vec3,
+        /// Toward the front, of any length but zero.
+        normal: Vec3,
+    },
+}
+
+/// Which control hair a chain moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Handle {
+    /// The first of this number among those placed one by one ([`ControlHairs::single`]).
+    Single(u32),
+    /// The one rooted nearest to a point, rest scene space.
+    Nearest(Vec3),
 }
 
 /// Space of a painted direction.
@@ -144,12 +188,13 @@ pub fn comb(skin: &Skin, partings: &[Vec<Vec3>], ops: &[CombOp], hairs: &mut Con
     let mut counts = vec![CombCounts::default(); ops.len()];
     let frames: Vec<Frame> = hairs.root.par_iter().map(|p| skin.frame(p)).collect();
     for (op, count) in ops.iter().zip(&mut counts) {
-        let lines = match &op.kind {
-            CombKind::Follow { guides, .. } => (guides.0)(&starts(&frames, hairs)),
-            _ => Lines::default(),
-        };
+        let given = Given::new(&op.kind, skin, &frames, hairs);
         let (root, side, parting, points) = (&hairs.root, &hairs.side, &hairs.parting, hairs.points);
+        let single = &hairs.single;
         let outcome = |(h, (local, cut)): (usize, (&mut [[f32; 3]], &mut f32))| {
+            if op.only.is_some_and(|only| single[h] == NONE || !only.contains(&single[h])) {
+                return CombCounts::default();
+            }
             let frame = &frames[h];
             let uv = skin.uv(&root[h]);
             let mut weight = op.weight * op.region.map_or(1.0, |m| f64::from(m.value(uv)));
@@ -161,8 +206,7 @@ pub fn comb(skin: &Skin, partings: &[Vec<Vec3>], ops: &[CombOp], hairs: &mut Con
             if weight == 0.0 {
                 return CombCounts::default();
             }
-            let line = if lines.at.is_empty() { &[] } else { lines.line(h) };
-            apply(&op.kind, weight, Hair { frame, uv, line, local, cut })
+            apply(&op.kind, &given, weight, Hair { index: h, frame, uv, side: side[h], local, cut })
         };
         let each = hairs.local.par_chunks_mut(points).zip(&mut hairs.cut).enumerate();
         *count = each.map(outcome).reduce(CombCounts::default, |a, b| CombCounts {
@@ -171,6 +215,33 @@ pub fn comb(skin: &Skin, partings: &[Vec<Vec3>], ops: &[CombOp], hairs: &mut Con
         });
     }
     counts
+}
+
+/// What an operation reads of all hairs before it changes the first.
+enum Given {
+    Nothing,
+    /// What hairs follow.
+    Lines(Lines),
+    Chain(chain::Motion),
+    Mirror(mirror::Front),
+}
+
+impl Given {
+    fn new(kind: &CombKind, skin: &Skin, frames: &[Frame], hairs: &ControlHairs) -> Given {
+        match kind {
+            CombKind::Follow { guides, .. } => Given::Lines((guides.0)(&starts(frames, hairs))),
+            CombKind::Chain { handle, turn, reach, radius, falloff } => {
+                let handle = chain::find(handle, frames, hairs);
+                let motion =
+                    handle.map(|h| chain::motion(h, &frames[h], hairs.hair(h), turn, *reach, *radius, *falloff));
+                motion.map_or(Given::Nothing, Given::Chain)
+            }
+            CombKind::Mirror { point, normal } => {
+                mirror::front(*point, *normal, skin.mesh, frames, hairs).map_or(Given::Nothing, Given::Mirror)
+            }
+            _ => Given::Nothing,
+        }
+    }
 }
 
 /// Where lines of hairs begin, which way without a better one (the normal), and their lengths.
@@ -230,10 +301,11 @@ fn nearest(line: &[Vec3], at: Vec3) -> Option<(Vec3, Vec3)> {
 
 /// A hair as an operation takes it.
 struct Hair<'a> {
+    index: usize,
     frame: &'a Frame,
     uv: [f32; 2],
-    /// What it follows, if it does.
-    line: &'a [Vec3],
+    /// Side of a parting that it stands on.
+    side: i8,
     /// Points relative to the root, in the root frame.
     local: &'a mut [[f32; 3]],
     /// Length that it was cut to.
@@ -241,12 +313,22 @@ struct Hair<'a> {
 }
 
 /// One operation on one hair.
-fn apply(kind: &CombKind, weight: f64, hair: Hair<'_>) -> CombCounts {
-    let Hair { frame, uv, line, local, cut: left } = hair;
+fn apply(kind: &CombKind, given: &Given, weight: f64, hair: Hair<'_>) -> CombCounts {
+    match given {
+        Given::Chain(motion) => return motion.apply(weight, hair),
+        Given::Mirror(front) => return front.apply(weight, hair),
+        Given::Nothing | Given::Lines(_) => {}
+    }
+    let Hair { index, frame, uv, side: _, local, cut: left } = hair;
     let value = |map: &Option<&TiledMap>| map.map_or(1.0, |m| f64::from(m.value(uv)));
     let combed = CombCounts { combed: 1, unpainted: 0 };
     match kind {
-        CombKind::Follow { bend, curvature, .. } => follow(line, weight * bend, *curvature, frame, local),
+        CombKind::Follow { bend, curvature, .. } => match given {
+            Given::Lines(lines) => follow(lines.line(index), weight * bend, *curvature, frame, local),
+            _ => CombCounts::default(),
+        },
+        // No handle, or a plane without a front.
+        CombKind::Chain { .. } | CombKind::Mirror { .. } => CombCounts::default(),
         CombKind::DirectionCurve { points, radius, falloff, bend, curvature } => {
             let Some((near, tangent)) = nearest(points, frame.origin) else { return CombCounts::default() };
             let a = weight * bend * influence((near - frame.origin).norm(), *radius, *falloff);
@@ -364,17 +446,26 @@ fn rebuild(local: &mut [[f32; 3]], mut turn: impl FnMut(Vec3, f64) -> Vec3) {
 /// Direction a fraction `f` of the way from unit `a` to unit `b` on their great circle. From opposite directions the way
 /// leads over x (in the root frame the normal), or over y if they are along x.
 pub(crate) fn slerp(a: Vec3, b: Vec3, f: f64) -> Vec3 {
+    match arc(a, b) {
+        Some((axis, angle)) => rotate(a, axis, angle * f),
+        None if f >= 1.0 => b,
+        None => a,
+    }
+}
+
+/// Axis and angle (radians) of the turn from unit `a` to unit `b`, as [`slerp`] goes; `None` for less than 1e-9.
+fn arc(a: Vec3, b: Vec3) -> Option<(Vec3, f64)> {
     let axis = a.cross(&b);
     let sine = axis.norm();
     let angle = libm::atan2(sine, a.dot(&b));
     if sine > 1e-9 {
-        return rotate(a, axis / sine, angle * f);
+        return Some((axis / sine, angle));
     }
     if a.dot(&b) > 0.0 {
-        return if f >= 1.0 { b } else { a };
+        return None;
     }
     let over = if a.x.abs() < 0.999 { Vec3::x() } else { Vec3::y() };
-    rotate(a, a.cross(&over).normalize(), angle * f)
+    Some((a.cross(&over).normalize(), angle))
 }
 
 /// Rotation about a unit axis (Rodrigues).

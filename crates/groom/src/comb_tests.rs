@@ -3,7 +3,7 @@ use crate::place::{PlaceSettings, Placement, place};
 use crate::test_skin::TestSkin;
 use pelage_geom::{Map, Wrap};
 
-fn groomed() -> (TestSkin, ControlHairs) {
+pub(super) fn groomed() -> (TestSkin, ControlHairs) {
     let s = TestSkin::new(24, 12, 0.5);
     let placement = Placement::Grid { u: 5, v: 6, even: false };
     let settings = PlaceSettings { placement, points: 6, length: 3.0, ..PlaceSettings::default() };
@@ -11,8 +11,8 @@ fn groomed() -> (TestSkin, ControlHairs) {
     (s, hairs)
 }
 
-fn op(kind: CombKind<'_>) -> CombOp<'_> {
-    CombOp { kind, weight: 1.0, region: None, side: None }
+pub(super) fn op(kind: CombKind<'_>) -> CombOp<'_> {
+    CombOp { kind, weight: 1.0, region: None, side: None, only: None }
 }
 
 #[test]
@@ -251,6 +251,20 @@ fn sides_of_a_parting() {
         let f = s.skin().frame(&hairs.root[h]);
         let side = side_of(&parting[0], f.origin, f.n);
         assert_eq!(before.hair(h) == hairs.hair(h), side == -1, "{side}");
+    }
+}
+
+#[test]
+fn only_the_hairs_that_are_named_are_combed() {
+    let (s, mut hairs) = groomed();
+    (hairs.single[3], hairs.single[20], hairs.single[21]) = (0, 1, 2);
+    let before = hairs.clone();
+    for (only, combed) in [(&[][..], &[][..]), (&[2, 0], &[3, 21]), (&[NONE], &[])] {
+        let mut hairs = before.clone();
+        let named = CombOp { only: Some(only), ..op(curve(f64::INFINITY, 1.0, 0.0)) };
+        let counts = comb(&s.skin(), &[], &[named], &mut hairs);
+        assert_eq!(counts[0].combed, combed.len());
+        assert!((0..hairs.len()).all(|h| combed.contains(&h) == (hairs.hair(h) != before.hair(h))));
     }
 }
 

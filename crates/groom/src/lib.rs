@@ -19,6 +19,7 @@ pub mod instance;
 pub mod interpolate;
 pub mod keep;
 pub mod look;
+mod near;
 pub mod parting;
 pub mod place;
 mod place_grid;

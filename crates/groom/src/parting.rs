@@ -435,7 +435,12 @@ mod tests {
         let (mut hairs, _, _) = place(&s.skin(), &s.bvh, &settings(&lines));
         let before = hairs.clone();
         let kind = CombKind::Bend { angle: 50.0, map: None, curvature: 0.5 };
-        comb(&s.skin(), &lines, &[CombOp { kind, weight: 1.0, region: None, side: Some((0, -1)) }], &mut hairs);
+        comb(
+            &s.skin(),
+            &lines,
+            &[CombOp { kind, weight: 1.0, region: None, side: Some((0, -1)), only: None }],
+            &mut hairs,
+        );
         for h in 0..hairs.len() {
             let f = s.skin().frame(&hairs.root[h]);
             let on_line = hairs.parting[h] == 0;

@@ -8,6 +8,7 @@
 use crate::cells::Cells;
 use crate::comb::side_of;
 use crate::control::{ControlHairs, Sites, Skin, to_local, vec3};
+use crate::near::Near;
 use crate::parting::{PartingCounts, add_partings, evenly, trace};
 use crate::place_grid::{even_roots, grid_roots};
 use crate::place_relax::{chart_areas, relax};
@@ -19,10 +20,6 @@ use rayon::prelude::*;
 /// the spacing a visible strip along every border is left to the border hairs alone; near 0 the triangulation gets
 /// slivers, over which the direction jumps from one hair to another within a hair's width.
 pub const BORDER_GAP: f64 = 0.35;
-
-/// Drawn hairs that a derived hair is blended from. One would copy a single drawn hair with its accidents along the
-/// border; ten blend across the crown of a head, where directions fan out and cancel.
-const NEIGHBOURS: usize = 4;
 
 /// Drawn hairs shorter than this part of the mean length are strays of an export and carry no direction.
 const TOO_SHORT: f64 = 1e-3;
@@ -410,37 +407,17 @@ fn by_hand(single: &Single, points: usize) -> Option<Vec<Vec3>> {
 /// A hair between drawn ones: the unit segment vectors and the length of the nearest, weighted by 1 / distance^2 in space,
 /// world directions. Only drawn hairs that `accept` takes, unless it takes none.
 fn blend_nearest(drawn: &[Drawn], at: Vec3, accept: impl Fn(&Drawn) -> bool) -> Vec<Vec3> {
-    // Ascending by (distance, index): the same whatever the order of evaluation.
-    let mut near: Vec<(f64, usize)> = Vec::with_capacity(NEIGHBOURS + 1);
-    for filter in [true, false] {
-        for (i, d) in drawn.iter().enumerate() {
-            let distance = (d.at - at).norm_squared();
-            if near.len() == NEIGHBOURS && near[NEIGHBOURS - 1].0 <= distance || filter && !accept(d) {
-                continue;
-            }
-            let place = near.partition_point(|n| n.0 <= distance);
-            near.insert(place, (distance, i));
-            near.truncate(NEIGHBOURS);
-        }
-        if !near.is_empty() {
-            break;
-        }
+    let near = Near::find(drawn.iter().map(|d| d.at), at, |i| accept(&drawn[i])).expect("there are drawn hairs");
+    let nearest = &drawn[near.nearest()].line;
+    if near.squared == 0.0 {
+        return nearest.clone();
     }
-    let nearest = &drawn[near[0].1];
-    if near[0].0 == 0.0 {
-        return nearest.line.clone();
-    }
-    let weight: Vec<f64> = near.iter().map(|n| near[0].0 / n.0).collect();
-    let total: f64 = weight.iter().sum();
-    let length = |d: &Drawn| d.line.windows(2).map(|w| (w[1] - w[0]).norm()).sum::<f64>();
-    let step = near.iter().zip(&weight).map(|(n, w)| w * length(&drawn[n.1])).sum::<f64>() / total;
-    let step = step / (nearest.line.len() - 1) as f64;
+    let length = |i: usize| drawn[i].line.windows(2).map(|w| (w[1] - w[0]).norm()).sum::<f64>();
+    let step = near.mean(length) / (nearest.len() - 1) as f64;
     let mut out = vec![Vec3::zeros()];
-    for s in 0..nearest.line.len() - 1 {
-        let unit = |d: &Drawn| (d.line[s + 1] - d.line[s]).try_normalize(0.0).unwrap_or_default();
-        let sum: Vec3 = near.iter().zip(&weight).map(|(n, w)| unit(&drawn[n.1]) * *w).sum();
-        let blend = (sum / total).try_normalize(1e-3).unwrap_or_else(|| unit(nearest));
-        out.push(out[s] + blend * step);
+    for s in 0..nearest.len() - 1 {
+        let unit = |i: usize| (drawn[i].line[s + 1] - drawn[i].line[s]).try_normalize(0.0).unwrap_or_default();
+        out.push(out[s] + near.direction(unit) * step);
     }
     out
 }
