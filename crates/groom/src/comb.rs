@@ -2,7 +2,7 @@
 //!
 //! After "Course notes 2003, A production pipeline for hair", §3.2: combing direction curves, degree of bending and
 //! curvature, region of influence with a falloff; §5: a chain over a control hair. An operation never changes the length of
-//! a segment except [`CombKind::Length`], [`CombKind::Cut`] and [`CombKind::Mirror`]: directions change, the hair is built up
+//! a segment except [`CombKind::Length`], [`CombKind::Cut`], [`CombKind::Trim`] and [`CombKind::Mirror`]: directions change, the hair is built up
 //! again from its root.
 //!
 //! With `a` the amount of an operation at a hair (its weight, region map, falloff and bend multiplied), segment k turns by
@@ -16,9 +16,9 @@ mod mirror;
 use crate::control::{ControlHairs, Skin, to_local, to_world, vec3};
 use crate::field::lengths::{Shear, Sphere};
 use crate::flow::trace::{Lines, Start};
-use crate::flow::trim::cut;
+use crate::flow::trim::{cut, length_to};
 use pelage_geom::curve::{closest_on_polyline, length as polyline_length};
-use pelage_geom::{Frame, NONE, TiledMap, Vec3};
+use pelage_geom::{Bvh, Frame, NONE, TiledMap, Vec3};
 use rayon::prelude::*;
 
 /// Elevation over the root's tangent plane that a laid-down hair keeps, radians (2 degrees). At 0 rounding puts half of
@@ -29,13 +29,35 @@ const FLAT_ELEVATION: f64 = 2.0 * std::f64::consts::PI / 180.0;
 /// must not count; a painted unit vector blurred over a fan of 90 degrees still has a length of 0.6.
 const UNPAINTED: f64 = 0.02;
 
+/// A number that may differ from hair to hair.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Amount<'a> {
+    /// The number.
+    pub value: f64,
+    /// \[H\] factors on it; empty: 1 for all.
+    pub factor: &'a [f32],
+}
+
+impl Amount<'_> {
+    /// That of a hair.
+    fn of(&self, h: usize) -> f64 {
+        self.value * self.factor.get(h).map_or(1.0, |f| f64::from(*f))
+    }
+}
+
+impl From<f64> for Amount<'_> {
+    fn from(value: f64) -> Self {
+        Amount { value, factor: &[] }
+    }
+}
+
 /// One step of combing.
 #[derive(Clone, Debug)]
 pub struct CombOp<'a> {
     /// What to do.
     pub kind: CombKind<'a>,
     /// Overall weight; 0 leaves every hair byte for byte.
-    pub weight: f64,
+    pub weight: Amount<'a>,
     /// Map multiplied onto the weight, read at the texture coordinates of the hair's root.
     pub region: Option<&'a TiledMap>,
     /// Only the hairs on one side of a parting: (index of the parting, +1 left or -1 right).
@@ -67,9 +89,9 @@ pub enum CombKind<'a> {
         /// Part of the radius over which influence fades (smoothstep): 0 a hard edge, 1 from the curve outward.
         falloff: f64,
         /// How far toward the curve's direction, 0 to 1.
-        bend: f64,
+        bend: Amount<'a>,
         /// Where along the hair, 0 to 1 (module documentation).
-        curvature: f64,
+        curvature: Amount<'a>,
     },
     /// Toward a direction painted as colour: 2 c - 1.
     DirectionMap {
@@ -78,34 +100,34 @@ pub enum CombKind<'a> {
         /// What r, g, b are coordinates of.
         space: DirectionSpace,
         /// How far toward the painted direction, 0 to 1.
-        bend: f64,
+        bend: Amount<'a>,
         /// Where along the hair, 0 to 1.
-        curvature: f64,
+        curvature: Amount<'a>,
     },
     /// Toward a line from the hair's root, segment by segment: with an amount of 1 the hair takes its shape.
     Follow {
         /// The lines.
         guides: Guides<'a>,
         /// How far toward the line, 0 to 1.
-        bend: f64,
+        bend: Amount<'a>,
         /// Where along the hair, 0 to 1.
-        curvature: f64,
+        curvature: Amount<'a>,
     },
     /// Turns segments in the plane of the normal and the hair's lean, away from the normal. The lean is the part of
     /// root to tip in the tangent plane, for an upright hair dU.
     Bend {
         /// Angle at the tip (with curvature 0 everywhere), degrees; negative straightens up.
-        angle: f64,
+        angle: Amount<'a>,
         /// Map multiplied onto the angle.
         map: Option<&'a TiledMap>,
         /// Where along the hair, 0 to 1.
-        curvature: f64,
+        curvature: Amount<'a>,
     },
     /// Lowers every segment toward the root's tangent plane and keeps its azimuth: elevation e becomes
     /// `e + a (2 degrees - e)`.
     LayDown {
         /// 0 to 1: 1 lies flat, but for 2 degrees.
-        amount: f64,
+        amount: Amount<'a>,
         /// Map multiplied onto the amount.
         map: Option<&'a TiledMap>,
     },
@@ -117,10 +139,15 @@ pub enum CombKind<'a> {
         /// Hair is as long as the way around this sphere to its plane; without, it is cut where it meets the plane.
         scalp: Option<Sphere>,
     },
+    /// Cuts hairs where they first run through a surface ("streamlines of flow" in the same course notes, §3); weights as for a cut.
+    Trim {
+        /// The surface, rest scene space.
+        surface: &'a Bvh,
+    },
     /// Multiplies lengths by `1 + weight (value * map - 1)`, not less than 1/1000.
     Length {
         /// Factor.
-        value: f64,
+        value: Amount<'a>,
         /// Map multiplied onto the factor.
         map: Option<&'a TiledMap>,
     },
@@ -197,7 +224,7 @@ pub fn comb(skin: &Skin, partings: &[Vec<Vec3>], ops: &[CombOp], hairs: &mut Con
             }
             let frame = &frames[h];
             let uv = skin.uv(&root[h]);
-            let mut weight = op.weight * op.region.map_or(1.0, |m| f64::from(m.value(uv)));
+            let mut weight = op.weight.of(h) * op.region.map_or(1.0, |m| f64::from(m.value(uv)));
             if let Some((p, wanted)) = op.side {
                 let known = if parting[h] == p { Some(side[h]) } else { None };
                 let side = known.or_else(|| Some(side_of(partings.get(p as usize)?, frame.origin, frame.n)));
@@ -324,15 +351,17 @@ fn apply(kind: &CombKind, given: &Given, weight: f64, hair: Hair<'_>) -> CombCou
     let combed = CombCounts { combed: 1, unpainted: 0 };
     match kind {
         CombKind::Follow { bend, curvature, .. } => match given {
-            Given::Lines(lines) => follow(lines.line(index), weight * bend, *curvature, frame, local),
+            Given::Lines(lines) => {
+                follow(lines.line(index), weight * bend.of(index), curvature.of(index), frame, local)
+            }
             _ => CombCounts::default(),
         },
         // No handle, or a plane without a front.
         CombKind::Chain { .. } | CombKind::Mirror { .. } => CombCounts::default(),
         CombKind::DirectionCurve { points, radius, falloff, bend, curvature } => {
             let Some((near, tangent)) = nearest(points, frame.origin) else { return CombCounts::default() };
-            let a = weight * bend * influence((near - frame.origin).norm(), *radius, *falloff);
-            turn_toward(to_local(frame, tangent), a, *curvature, local)
+            let a = weight * bend.of(index) * influence((near - frame.origin).norm(), *radius, *falloff);
+            turn_toward(to_local(frame, tangent), a, curvature.of(index), local)
         }
         CombKind::DirectionMap { map, space, bend, curvature } => {
             let c = vec3(map.sample(uv)) * 2.0 - Vec3::repeat(1.0);
@@ -340,10 +369,11 @@ fn apply(kind: &CombKind, given: &Given, weight: f64, hair: Hair<'_>) -> CombCou
                 return CombCounts { combed: 0, unpainted: 1 };
             }
             let target = if *space == DirectionSpace::Root { c } else { to_local(frame, c) };
-            turn_toward(target.normalize(), weight * bend, *curvature, local)
+            turn_toward(target.normalize(), weight * bend.of(index), curvature.of(index), local)
         }
         CombKind::Bend { angle, map, curvature } => {
-            let angle = (angle * weight * value(map)).to_radians();
+            let angle = (angle.of(index) * weight * value(map)).to_radians();
+            let curvature = curvature.of(index);
             if angle == 0.0 {
                 return CombCounts::default();
             }
@@ -352,7 +382,7 @@ fn apply(kind: &CombKind, given: &Given, weight: f64, hair: Hair<'_>) -> CombCou
             combed
         }
         CombKind::LayDown { amount, map } => {
-            let a = (amount * weight * value(map)).clamp(0.0, 1.0);
+            let a = (amount.of(index) * weight * value(map)).clamp(0.0, 1.0);
             if a == 0.0 {
                 return CombCounts::default();
             }
@@ -365,12 +395,14 @@ fn apply(kind: &CombKind, given: &Given, weight: f64, hair: Hair<'_>) -> CombCou
             });
             combed
         }
-        CombKind::Cut { shear, scalp } => {
+        CombKind::Cut { .. } | CombKind::Trim { .. } => {
             let line = world_points(frame, local);
             let length: f64 = line.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
-            let asked = match scalp {
-                Some(scalp) => Some(shear.length(scalp, frame.origin)),
-                None => shear.length_along(&line),
+            let asked = match kind {
+                CombKind::Cut { shear, scalp: Some(scalp) } => Some(shear.length(scalp, frame.origin)),
+                CombKind::Cut { shear, scalp: None } => shear.length_along(&line),
+                CombKind::Trim { surface } => length_to(&line, surface),
+                _ => None,
             };
             let asked = asked.filter(|l| *l < length).map(|l| length + weight.min(1.0) * (l - length));
             let Some(asked) = asked else { return CombCounts::default() };
@@ -383,7 +415,7 @@ fn apply(kind: &CombKind, given: &Given, weight: f64, hair: Hair<'_>) -> CombCou
             combed
         }
         CombKind::Length { value: factor, map } => {
-            let f = (1.0 + weight * (factor * value(map) - 1.0)).max(1e-3);
+            let f = (1.0 + weight * (factor.of(index) * value(map) - 1.0)).max(1e-3);
             if f == 1.0 {
                 return CombCounts::default();
             }

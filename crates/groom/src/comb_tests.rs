@@ -12,7 +12,7 @@ pub(super) fn groomed() -> (TestSkin, ControlHairs) {
 }
 
 pub(super) fn op(kind: CombKind<'_>) -> CombOp<'_> {
-    CombOp { kind, weight: 1.0, region: None, side: None, only: None }
+    CombOp { kind, weight: 1.0.into(), region: None, side: None, only: None }
 }
 
 #[test]
@@ -30,7 +30,7 @@ fn hair_that_follows_a_line_takes_its_shape_and_keeps_its_length() {
         });
         Lines { points, at: at.collect(), straight_from: vec![points as u32; starts.len()] }
     };
-    let follow = |bend| CombKind::Follow { guides: Guides(&arc), bend, curvature: 0.0 };
+    let follow = |bend| CombKind::Follow { guides: Guides(&arc), bend: Amount::from(bend), curvature: 0.0.into() };
     let mut whole = before.clone();
     let counts = comb(&s.skin(), &[], &[op(follow(1.0))], &mut whole);
     assert_eq!(counts[0].combed, before.len());
@@ -82,7 +82,7 @@ fn cut_hair_ends_at_its_plane_and_is_never_longer() {
 
 fn curve(radius: f64, bend: f64, curvature: f64) -> CombKind<'static> {
     let points = vec![Vec3::new(-20.0, 12.0, 0.0), Vec3::new(20.0, 12.0, 5.0)];
-    CombKind::DirectionCurve { points, radius, falloff: 0.5, bend, curvature }
+    CombKind::DirectionCurve { points, radius, falloff: 0.5, bend: bend.into(), curvature: curvature.into() }
 }
 
 fn flat(value: &[f32]) -> TiledMap {
@@ -93,10 +93,10 @@ fn flat(value: &[f32]) -> TiledMap {
 fn all_ops<'a>(rgb: &'a TiledMap, half: &'a TiledMap) -> Vec<CombOp<'a>> {
     [
         curve(f64::INFINITY, 0.7, 0.6),
-        CombKind::DirectionMap { map: rgb, space: DirectionSpace::Root, bend: 0.5, curvature: 0.3 },
-        CombKind::Bend { angle: 40.0, map: Some(half), curvature: 1.0 },
-        CombKind::LayDown { amount: 0.8, map: None },
-        CombKind::Length { value: 1.5, map: Some(half) },
+        CombKind::DirectionMap { map: rgb, space: DirectionSpace::Root, bend: 0.5.into(), curvature: 0.3.into() },
+        CombKind::Bend { angle: 40.0.into(), map: Some(half), curvature: 1.0.into() },
+        CombKind::LayDown { amount: 0.8.into(), map: None },
+        CombKind::Length { value: 1.5.into(), map: Some(half) },
     ]
     .into_iter()
     .map(op)
@@ -110,7 +110,7 @@ fn weight_zero_changes_no_byte() {
     comb(&s.skin(), &[], &all_ops(&rgb, &half), &mut hairs);
     let before = hairs.clone();
     let mut ops = all_ops(&rgb, &half);
-    ops.iter_mut().for_each(|o| o.weight = 0.0);
+    ops.iter_mut().for_each(|o| o.weight = 0.0.into());
     let mut regions = all_ops(&rgb, &half);
     regions.iter_mut().for_each(|o| o.region = Some(&zero));
     ops.extend(regions);
@@ -193,7 +193,7 @@ fn laying_down_keeps_the_azimuth_and_ends_near_the_tangent_plane() {
     let (s, mut hairs) = groomed();
     comb(&s.skin(), &[], &[op(curve(f64::INFINITY, 0.4, 0.5))], &mut hairs);
     let before = hairs.clone();
-    comb(&s.skin(), &[], &[op(CombKind::LayDown { amount: 1.0, map: None })], &mut hairs);
+    comb(&s.skin(), &[], &[op(CombKind::LayDown { amount: 1.0.into(), map: None })], &mut hairs);
     for h in 0..hairs.len() {
         for k in 0..5 {
             let segment = |c: &ControlHairs| (vec3(c.hair(h)[k + 1]) - vec3(c.hair(h)[k])).normalize();
@@ -207,7 +207,7 @@ fn laying_down_keeps_the_azimuth_and_ends_near_the_tangent_plane() {
 #[test]
 fn a_bend_turns_the_tip_by_its_angle() {
     let (s, mut hairs) = groomed();
-    comb(&s.skin(), &[], &[op(CombKind::Bend { angle: 90.0, map: None, curvature: 1.0 })], &mut hairs);
+    comb(&s.skin(), &[], &[op(CombKind::Bend { angle: 90.0.into(), map: None, curvature: 1.0.into() })], &mut hairs);
     for h in 0..hairs.len() {
         let p = hairs.hair(h);
         assert!((p[1][0] - 0.6).abs() < 1e-6 && (p[5][0] - p[4][0]).abs() < 1e-6 && p[5][1] - p[4][1] > 0.599);
@@ -219,7 +219,7 @@ fn painted_directions_are_read_in_their_space_and_grey_says_nothing() {
     let (s, mut hairs) = groomed();
     let upright = hairs.clone();
     let grey = flat(&[128.0 / 255.0; 3]);
-    let map = |map, space| op(CombKind::DirectionMap { map, space, bend: 1.0, curvature: 0.0 });
+    let map = |map, space| op(CombKind::DirectionMap { map, space, bend: 1.0.into(), curvature: 0.0.into() });
     let counts = comb(&s.skin(), &[], &[map(&grey, DirectionSpace::World)], &mut hairs);
     assert_eq!((counts[0].unpainted, &hairs), (hairs.len(), &upright));
     let along_z = flat(&[0.5, 0.5, 1.0]);
@@ -274,4 +274,37 @@ fn opposite_directions_turn_over_the_normal() {
     assert!((half - Vec3::x()).norm() < 1e-12, "{half}");
     assert!((slerp(Vec3::x(), -Vec3::x(), 1.0) + Vec3::x()).norm() < 1e-12);
     assert!((slerp(Vec3::x(), Vec3::z(), 1.0) - Vec3::z()).norm() < 1e-12);
+}
+
+#[test]
+fn amounts_may_differ_from_hair_to_hair() {
+    let (s, before) = groomed();
+    let mut factor = vec![0.0; before.len()];
+    factor[1] = 0.5;
+    let kind = |angle: f64| CombKind::Bend { angle: angle.into(), map: None, curvature: 0.0.into() };
+    let (mut each, mut half) = (before.clone(), before.clone());
+    let vary = CombOp { weight: Amount { value: 1.0, factor: &factor }, ..op(kind(60.0)) };
+    assert_eq!(comb(&s.skin(), &[], &[vary], &mut each)[0].combed, 1);
+    comb(&s.skin(), &[], &[op(kind(30.0))], &mut half);
+    assert_eq!(each.hair(0), before.hair(0));
+    assert_eq!(each.hair(1), half.hair(1));
+}
+
+#[test]
+fn hair_is_trimmed_where_it_runs_through_a_surface() {
+    let (s, before) = groomed();
+    // A ball around the first root.
+    let radius = 1.25;
+    let centre = s.skin().frame(&before.root[0]).origin;
+    let ball = pelage_geom::shapes::cube_sphere(48, radius);
+    let position: Vec<[f64; 3]> = ball.position.iter().map(|p| (Vec3::from(*p) + centre).into()).collect();
+    let surface = Bvh::build(&position, &ball.triangle, &pelage_geom::Topology::new(&ball));
+    let mut hairs = before.clone();
+    comb(&s.skin(), &[], &[op(CombKind::Trim { surface: &surface })], &mut hairs);
+    assert!((hairs.length(0) - radius).abs() < 5e-3, "{}", hairs.length(0));
+    assert!((f64::from(hairs.cut[0]) - hairs.length(0)).abs() < 1e-6);
+    let apart = |h: usize| (s.skin().frame(&before.root[h]).origin - centre).norm();
+    for h in (0..hairs.len()).filter(|h| apart(*h) > radius + before.length(*h)) {
+        assert_eq!((hairs.hair(h), hairs.cut[h]), (before.hair(h), f32::INFINITY));
+    }
 }

@@ -8,7 +8,7 @@
 //! One thing is added to the paper: a blend of unit vectors is shorter than one, so each blended segment is normalised
 //! again before it is scaled. A hair's length is then exactly what its map says.
 
-use crate::control::{ControlHairs, to_world, vec3};
+use crate::control::{ControlHairs, to_local, to_world, vec3};
 use pelage_geom::curve::resample;
 use pelage_geom::{Mesh, Pose, SurfacePoint, Topology, Vec3};
 use rayon::prelude::*;
@@ -127,6 +127,49 @@ pub fn pose_controls(
         }
     });
     ControlPose::from_polylines(&world, controls.points, points)
+}
+
+/// Control hairs as seen from their roots, for hairs that are blended there: their own coordinates are those of the root frame.
+pub fn local_controls(controls: &ControlHairs, points: usize) -> ControlPose {
+    let local: Vec<Vec3> = controls.local.iter().map(|p| vec3(*p)).collect();
+    ControlPose::from_polylines(&local, controls.points, points)
+}
+
+/// Control hairs at a pose (H polylines of P points each, any origin) as seen from their roots there.
+pub fn seen_from_roots(
+    line: &mut [Vec3],
+    points: usize,
+    root: &[SurfacePoint],
+    mesh: &Mesh,
+    topology: &Topology,
+    pose: &Pose,
+) {
+    line.par_chunks_mut(points).zip(root).for_each(|(line, root)| {
+        let frame = pose.frame(mesh, topology, root);
+        let origin = line[0];
+        line.iter_mut().for_each(|p| *p = to_local(&frame, *p - origin));
+    });
+}
+
+/// Hairs that were blended as seen from their roots (root 0), to where these are at a pose: `at` are the roots' positions,
+/// `out` the points of all hairs, `points` each. After the interpolation in local frames of Chang, Jin, Yu (2002, §2.2): what
+/// leans the same way from the skin at every control hair does so at every hair, however the skin is bent.
+pub fn to_roots(
+    mesh: &Mesh,
+    topology: &Topology,
+    pose: &Pose,
+    root: &[SurfacePoint],
+    at: &[[f32; 3]],
+    points: usize,
+    out: &mut [[f32; 3]],
+) {
+    out.par_chunks_mut(points).zip(root).zip(at).for_each(|((hair, root), at)| {
+        let frame = pose.frame(mesh, topology, root);
+        for p in hair {
+            let v = to_world(&frame, vec3(*p));
+            *p = [at[0] + v.x as f32, at[1] + v.y as f32, at[2] + v.z as f32];
+        }
+    });
 }
 
 /// Unit segment vectors of one polyline into its blocks; returns how many segments had no length.
@@ -486,6 +529,38 @@ mod tests {
         let (one, two) = (with(1), with(3));
         assert_eq!(one.1, two.1);
         assert!(bits(one.0) == bits(two.0));
+    }
+
+    #[test]
+    fn hairs_blended_at_their_roots_lean_from_the_skin_as_their_controls_do() {
+        let s = crate::test_skin::TestSkin::new(12, 8, 1.0);
+        let (skin, points) = (s.skin(), 5);
+        let mut controls = ControlHairs { points, ..ControlHairs::default() };
+        let lean: Vec<Vec3> = (0..points).map(|k| Vec3::new(k as f64, 0.2 * (k * k) as f64, -0.3 * k as f64)).collect();
+        let root = |k: u32| SurfacePoint { triangle: 3 * k, bary: [0.2, 0.5] };
+        (0..12).for_each(|k| controls.push(root(k), &lean));
+        let roots: Vec<SurfacePoint> = (0..30).map(|k| SurfacePoint { triangle: k, bary: [0.4, 0.1] }).collect();
+        let hair: Vec<[u32; 3]> = (0..30).map(|k| [k % 12, (k + 5) % 12, (k + 7) % 12]).collect();
+        let (weight, length) = (vec![[0.3, 0.3, 0.4]; 30], vec![2.0f32; 30]);
+        let at = root_positions(skin.mesh, skin.rest, &roots, [0.0; 3]);
+        let blend = Blend { root: &[[0.0; 3]; 30], hair: &hair, weight: &weight, length: &length };
+        let (mut out, _) = blend_all(&blend, &local_controls(&controls, points));
+        let own = out[..points].to_vec();
+        assert!(out.chunks(points).all(|h| h == own), "every hair is the same as seen from its root");
+        to_roots(skin.mesh, skin.topology, skin.rest, &roots, &at, points, &mut out);
+        for (h, root) in roots.iter().enumerate() {
+            let frame = skin.frame(root);
+            for (k, p) in out[h * points..][..points].iter().enumerate() {
+                let local = to_local(&frame, vec3(*p) - vec3(at[h]));
+                assert!((local - vec3(own[k])).norm() < 1e-5, "hair {h} point {k}");
+            }
+        }
+        // From their points in the world, controls look the same.
+        let mut line: Vec<Vec3> =
+            (0..12).flat_map(|h| controls.placed(h, &skin.frame(&root(h as u32))).collect::<Vec<_>>()).collect();
+        let all: Vec<SurfacePoint> = (0..12).map(root).collect();
+        seen_from_roots(&mut line, points, &all, skin.mesh, skin.topology, skin.rest);
+        assert!(line.iter().zip(lean.iter().cycle()).all(|(a, b)| (a - b).norm() < 1e-5));
     }
 
     #[test]

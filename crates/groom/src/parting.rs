@@ -434,11 +434,11 @@ mod tests {
         let lines = [arc([40.0, 10.0], [130.0, 35.0])];
         let (mut hairs, _, _) = place(&s.skin(), &s.bvh, &settings(&lines));
         let before = hairs.clone();
-        let kind = CombKind::Bend { angle: 50.0, map: None, curvature: 0.5 };
+        let kind = CombKind::Bend { angle: 50.0.into(), map: None, curvature: 0.5.into() };
         comb(
             &s.skin(),
             &lines,
-            &[CombOp { kind, weight: 1.0, region: None, side: Some((0, -1)), only: None }],
+            &[CombOp { kind, weight: 1.0.into(), region: None, side: Some((0, -1)), only: None }],
             &mut hairs,
         );
         for h in 0..hairs.len() {

@@ -240,8 +240,14 @@ mod tests {
 
     fn comb_toward(s: &TestSkin, hairs: &mut ControlHairs, d: Vec3, curvature: f64) {
         let points = vec![Vec3::zeros(), d];
-        let kind = CombKind::DirectionCurve { points, radius: f64::INFINITY, falloff: 0.0, bend: 1.0, curvature };
-        comb(&s.skin(), &[], &[CombOp { kind, weight: 1.0, region: None, side: None, only: None }], hairs);
+        let kind = CombKind::DirectionCurve {
+            points,
+            radius: f64::INFINITY,
+            falloff: 0.0,
+            bend: 1.0.into(),
+            curvature: curvature.into(),
+        };
+        comb(&s.skin(), &[], &[CombOp { kind, weight: 1.0.into(), region: None, side: None, only: None }], hairs);
     }
 
     /// Least signed distance of points every 0.1 along all hairs but their roots.

@@ -3,7 +3,8 @@
 use crate::Error;
 use crate::cache::FileHashes;
 use crate::config::{
-    BodyKind, BodyMesh, Document, Emitter, Feature, GroomFile, Key, Keyed, Material, SEGMENTS, ShotFile, Target,
+    BodyKind, BodyMesh, Comb, Document, Emitter, Feature, GroomFile, Key, Keyed, Layer, Material, SEGMENTS, ShotFile,
+    Target,
 };
 use crate::format::csv;
 use crate::quality::{self, Resolved};
@@ -109,6 +110,8 @@ pub struct Project {
     pub curves: Option<InputFile>,
     /// Curves that control hairs are drawn as, if they are.
     pub drawn: Option<InputFile>,
+    /// Meshes that trim hair, by the operation of combing.
+    pub trims: BTreeMap<usize, InputFile>,
     /// Meshes whose triangles are the panels of flows, by comb operation.
     pub panels: BTreeMap<usize, InputFile>,
     /// The skin at every frame of the shot.
@@ -159,6 +162,7 @@ impl Project {
                 let mut groom: Document<GroomFile> = Document::read_joined(&path)?;
                 groom.check()?;
                 groom.value.settle();
+                check_motion(&shot, &groom)?;
                 groom
             }
             None => Document::parse(&shot.path, CURVES_GROOM.to_owned())?,
@@ -177,10 +181,13 @@ impl Project {
         let bodies = if simulated || !shot.value.light.is_empty() { find.bodies(&shot)? } else { Vec::new() };
         let drawn = groom.value.control.placement.curves.as_ref();
         let drawn = drawn.map(|p| find.file(&groom, "control.placement.curves", p)).transpose()?;
-        let mut panels = BTreeMap::new();
+        let (mut panels, mut trims) = (BTreeMap::new(), BTreeMap::new());
         for (i, c) in groom.value.comb.iter().enumerate() {
             if let Some(path) = c.panels.as_ref().and_then(|p| p.file.as_ref()) {
                 panels.insert(i, find.file(&groom, &format!("comb[{i}].panels.file"), path)?);
+            }
+            if let Some(path) = &c.file {
+                trims.insert(i, find.file(&groom, &format!("comb[{i}].file"), path)?);
             }
         }
         let emitters = groom.value.emitter.iter().enumerate();
@@ -209,6 +216,7 @@ impl Project {
             bodies,
             drawn,
             panels,
+            trims,
             frames,
             before,
             motion,
@@ -246,7 +254,8 @@ impl Project {
         let motions = self.bodies.iter().map(|b| &b.motion).chain([&self.motion]).flatten().map(|m| &m.file);
         let single = [&self.rest, &self.curves, &self.drawn].into_iter().flatten();
         let maps = self.maps.values().chain(&self.mask).flatten().map(|(_, file)| file);
-        let single = single.chain(self.particles.iter().flatten()).chain(self.panels.values());
+        let single =
+            single.chain(self.particles.iter().flatten()).chain(self.panels.values()).chain(self.trims.values());
         single.chain(skins).chain(self.bodies.iter().map(|b| &b.file)).chain(motions).chain(maps).collect()
     }
 
@@ -295,6 +304,17 @@ impl Project {
         };
         let length = Feature { noise: 0.0, map: None, ..groom.layer[longest].length.clone() };
         (format!("layer[{longest}].length"), length)
+    }
+
+    /// The combing at a frame, or at rest, without key frames.
+    pub fn combs(&self, frame: Option<i32>) -> Vec<Comb> {
+        let moment = self.moment(frame);
+        self.groom.value.comb.iter().map(|c| c.at(moment)).collect()
+    }
+
+    /// True if control hairs change over the shot by themselves.
+    pub fn combs_move(&self) -> bool {
+        self.groom.value.comb.iter().any(Comb::is_animated)
     }
 
     /// What is simulated of a layer.
@@ -375,6 +395,21 @@ fn label(base: &Path, path: &Path) -> String {
 
 fn missing<T>(doc: &Document<T>, key: &str, path: &Path) -> crate::config::ConfigError {
     doc.error(key, format!("there is no file {}", path.display()), "paths are relative to the file that names them")
+}
+
+/// Combing with key frames moves hair that is not simulated.
+fn check_motion(shot: &Document<ShotFile>, groom: &Document<GroomFile>) -> Result<(), Error> {
+    let Some(i) = groom.value.comb.iter().position(Comb::is_animated) else { return Ok(()) };
+    let simulated = |l: &&Layer| l.simulate.unwrap_or(shot.value.simulate.target) != Target::Off;
+    match groom.value.layer.iter().find(simulated) {
+        None => Ok(()),
+        Some(l) => {
+            let what = format!("has key frames, and layer {} is simulated: its hair would not follow them", l.name);
+            Err(groom
+                .error(&format!("comb[{i}]"), what, "set `simulate = \"off\"` for the layer, or take them out")
+                .into())
+        }
+    }
 }
 
 /// Levels of clumps that a shot changes must be in its groom.

@@ -60,6 +60,11 @@ impl Ellipsoid {
         Ok(Ellipsoid { centre, turn, semi_axes })
     }
 
+    /// It after a translation.
+    pub fn moved(&self, by: Vec3) -> Self {
+        Ellipsoid { centre: self.centre + by, ..*self }
+    }
+
     /// Signed distance (inside below 0) and outward unit normal at the closest point of the surface.
     ///
     /// The closest point x to y has x_i = a_i^2 y_i / (t + a_i^2), where t is the largest root of F(t) = sum (a_i y_i /

@@ -365,7 +365,7 @@ mod tests {
         lengths_stay(&before, &hairs);
         // Half the weight is half the turn, of the handle too.
         let mut half = before.clone();
-        comb(&skin, &[], &[CombOp { weight: 0.5, ..op(kind()) }], &mut half);
+        comb(&skin, &[], &[CombOp { weight: 0.5.into(), ..op(kind()) }], &mut half);
         assert!((0..5).all(|k| (axis_angle(30, &half, k) - 0.5 * axis_angle(30, &hairs, k)).abs() < 1e-5));
     }
 }

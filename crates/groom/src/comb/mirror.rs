@@ -193,7 +193,7 @@ mod tests {
         assert!(between > 10, "{between}");
         // Half the weight is half the turn, and the mean of the lengths.
         let mut half = before.clone();
-        comb(&s.skin(), &[], &[CombOp { weight: 0.5, ..op(mirror()) }], &mut half);
+        comb(&s.skin(), &[], &[CombOp { weight: 0.5.into(), ..op(mirror()) }], &mut half);
         for h in (0..hairs.len()).filter(|&h| half.hair(h) != before.hair(h)) {
             assert!((half.length(h) - 0.5 * (hairs.length(h) + before.length(h))).abs() < 1e-5);
             let line = shape(&s, &half, h);

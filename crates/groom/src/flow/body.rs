@@ -1,7 +1,7 @@
 //! A body of source panels, and the strengths that give the flow through them that is asked for.
 
 use super::{Element, Flow, Panel};
-use nalgebra::{DMatrix, DVector, Dyn, LU};
+use nalgebra::{DMatrix, DVector};
 use pelage_geom::Vec3;
 use rayon::prelude::*;
 use std::fmt;
@@ -75,7 +75,16 @@ impl std::error::Error for FlowError {}
 #[derive(Clone, Debug)]
 pub struct Body {
     panel: Vec<Panel>,
-    factored: LU<f64, Dyn, Dyn>,
+    factored: Factored,
+}
+
+/// A matrix as the product of a lower triangle with ones on its diagonal and an upper one, its rows in another order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Factored {
+    /// \[N * N\] both triangles in one, column after column.
+    pub matrix: Vec<f64>,
+    /// \[N\] the row of the matrix that stands in each.
+    pub row: Vec<u32>,
 }
 
 impl Body {
@@ -102,7 +111,27 @@ impl Body {
         if pivot.iter().any(|p| !(*p).is_finite() || *p < 1e-10) {
             return Err(FlowError::Singular);
         }
+        let mut row = DVector::from_iterator(panel.len(), 0..panel.len() as u32);
+        factored.p().permute_rows(&mut row);
+        let factored = Factored { matrix: factored.lu_internal().as_slice().to_vec(), row: row.as_slice().to_vec() };
         Ok(Body { panel, factored })
+    }
+
+    /// It again from its mesh and its factored matrix; `None` if these do not belong together.
+    pub fn again(position: &[[f64; 3]], triangle: &[[u32; 3]], factored: Factored) -> Option<Self> {
+        let n = triangle.len();
+        let fits = factored.matrix.len() == n * n
+            && factored.row.len() == n
+            && factored.row.iter().all(|r| (*r as usize) < n)
+            && triangle.iter().flatten().all(|v| (*v as usize) < position.len());
+        let panel = |tri: &[u32; 3]| Panel::new(pelage_geom::mesh::corners(position, *tri));
+        let panel: Vec<Panel> = if fits { triangle.iter().map(panel).collect::<Option<_>>()? } else { return None };
+        Some(Body { panel, factored })
+    }
+
+    /// Its factored matrix.
+    pub fn factored(&self) -> &Factored {
+        &self.factored
     }
 
     /// The panels, one a triangle.
@@ -118,14 +147,26 @@ impl Body {
         }
         let flow = Flow { elements, ..Flow::default() };
         let wanted = |(p, v): (&Panel, &f64)| v - flow.by_elements(p.centre).dot(&p.normal);
-        let mut right = DVector::from_iterator(self.panel.len(), self.panel.iter().zip(normal_velocity).map(wanted));
-        if let Some(panel) = right.iter().position(|x| !x.is_finite()) {
+        let wanted: Vec<f64> = self.panel.iter().zip(normal_velocity).map(wanted).collect();
+        if let Some(panel) = wanted.iter().position(|x| !x.is_finite()) {
             return Err(FlowError::NotFinite { panel });
         }
-        if !self.factored.solve_mut(&mut right) {
-            return Err(FlowError::Singular);
+        let Factored { matrix, row } = &self.factored;
+        let n = row.len();
+        let mut right: Vec<f64> = row.iter().map(|r| wanted[*r as usize]).collect();
+        // Down through the lower triangle, up through the upper one, column by column.
+        for j in 0..n {
+            let (above, below) = right.split_at_mut(j + 1);
+            let x = above[j];
+            below.iter_mut().zip(&matrix[j * n + j + 1..]).for_each(|(b, m)| *b -= m * x);
         }
-        Ok(right.as_slice().to_vec())
+        for j in (0..n).rev() {
+            let column = &matrix[j * n..j * n + j + 1];
+            let x = right[j] / column[j];
+            right[j] = x;
+            right[..j].iter_mut().zip(column).for_each(|(b, m)| *b -= m * x);
+        }
+        Ok(right)
     }
 
     /// The flow of some elements and of strengths that were solved for with them.
@@ -191,6 +232,17 @@ mod tests {
             }
             elements.remove(1);
         }
+    }
+
+    #[test]
+    fn a_body_is_the_same_again_from_its_parts() {
+        let mesh = cube_sphere(3, 2.0);
+        let body = Body::new(&mesh.position, &mesh.triangle).expect("a body");
+        let again = Body::again(&mesh.position, &mesh.triangle, body.factored().clone()).expect("the same body");
+        let asked: Vec<f64> = (0..body.panels().len()).map(|i| (i % 5) as f64).collect();
+        assert_eq!(body.solve(&elements(), &asked), again.solve(&elements(), &asked));
+        let short = Factored { row: vec![0; 3], ..body.factored().clone() };
+        assert!(Body::again(&mesh.position, &mesh.triangle, short).is_none());
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub mod trace;
 mod tree;
 pub mod trim;
 
-pub use body::{Body, FlowError};
+pub use body::{Body, Factored, FlowError};
 pub use coarse::coarse;
 pub use element::Element;
 pub(crate) use element::segment;

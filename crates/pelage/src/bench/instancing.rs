@@ -5,7 +5,7 @@ use super::{Bench, Findings, Section, Study, machine, shots};
 use crate::Error;
 use crate::cli::Sample;
 use crate::progress::Progress;
-use crate::stage::{Runner, Skin, groom, instance};
+use crate::stage::{Runner, Skin, comb, groom, instance};
 use pelage_geom::curve::resample;
 use pelage_geom::{Map, NONE, SurfacePoint, TiledMap, Vec3, Wrap, rng, shapes};
 use pelage_groom::candidates::candidates;
@@ -37,7 +37,7 @@ fn groomed(folder: &Path) -> Result<Groomed, Error> {
     let project = shots::project(folder, Sample::Bust)?;
     let mut progress = Progress::new(true);
     let mut run = Runner::new(&project, shots::draft(), &mut progress)?;
-    let (skin, controls, sites) = (groom::skin(&mut run)?, groom::combed(&mut run)?, groom::placed(&mut run)?);
+    let (skin, controls, sites) = (groom::skin(&mut run)?, comb::combed(&mut run)?, groom::placed(&mut run)?);
     let triangulation = triangulate(&sites, &mirrored_charts(&skin.mesh, &skin.topology));
     let roots = instance::roots(&mut run, 0)?;
     Ok(Groomed { skin, controls, sites, triangulation, roots })

@@ -6,6 +6,7 @@ mod compare;
 mod depenetrate;
 mod init;
 mod inspect;
+mod intersect;
 mod preview;
 mod run;
 mod stress;
@@ -70,6 +71,8 @@ pub enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Say which hairs run through each other, or through ellipsoids; exit code 1 if any do
+    Intersect(intersect::IntersectArguments),
     /// Push curves out of a skin
     Depenetrate(depenetrate::DepenetrateArguments),
     /// Measure error against run time, and write a report
@@ -256,6 +259,7 @@ pub fn execute(arguments: Arguments) -> Result<bool, Error> {
         Command::Plan(a) => run::plan(a),
         Command::Inspect { file, json } => inspect::inspect(&file, json),
         Command::Compare { a, b, tolerance, json } => compare::compare(&a, &b, tolerance, json),
+        Command::Intersect(a) => intersect::run(&a),
         Command::Depenetrate(a) => depenetrate::run(&a),
         Command::Bench(a) => bench::run(&a),
         Command::Stress(a) => stress::run(&a),

@@ -1,11 +1,14 @@
 //! Combing: one operation after another on control hairs.
 
 use super::GroomFile;
-use super::document::{ConfigError, Document};
-use super::groom::{MapRef, some_points};
-use super::guides::{Ball, Element, Panels, Primitive, Region, Shear};
+use super::document::{ConfigError, Document, some_exactly};
+use super::groom::{MapRef, is_named, some_points};
+use super::guides::{Ball, Element, Panels, Plane, Primitive, Region, Shear};
+use super::keyed::{Keyed, Vector};
+use super::look_value::{LookValue, varied};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
 
 /// One combing operation. Which keys it reads depends on its kind.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -13,23 +16,25 @@ use serde::Deserialize;
 pub struct Comb {
     /// What it does.
     pub kind: CombKind,
+    /// Names of hairs placed one by one (or beginnings of names, `whisker*`) that it acts on. Default: all hairs.
+    pub hairs: Option<Vec<String>>,
     /// Strength, 0 to 1. Default: 1.
-    #[serde(default = "one")]
-    pub weight: f64,
+    #[serde(default = "whole")]
+    pub weight: LookValue,
     /// Painted strength: a map that multiplies the weight.
     pub region: Option<MapRef>,
     /// direction-curve: the curve at the rest pose, scene units, in the direction of combing.
     #[serde(default, deserialize_with = "some_points")]
     pub points: Option<Vec<[f64; 3]>>,
-    /// direction-curve: region of influence around the curve, scene units. Default: everywhere.
-    pub radius: Option<f64>,
-    /// direction-curve: share of the radius over which the influence fades, 0 (hard) to 1. Default: 1.
-    pub falloff: Option<f64>,
+    /// direction-curve, chain: region of influence around the curve or the hair, scene units. Default: everywhere.
+    pub radius: Option<Keyed<f64>>,
+    /// direction-curve, chain: share of the radius over which the influence fades, 0 (hard) to 1. Default: 1.
+    pub falloff: Option<Keyed<f64>>,
     /// direction-curve, direction-map, field, flow, cluster: how far hairs turn toward the direction, 0 to 1. Default: 1.
-    pub bend: Option<f64>,
+    pub bend: Option<LookValue>,
     /// 0: the whole hair turns at its root; 1: the turn grows from root to tip. Default: 0.
-    #[serde(default)]
-    pub curvature: f64,
+    #[serde(default = "none")]
+    pub curvature: LookValue,
     /// direction-curve, field, flow, cluster, cut: acts only on one side of a parting.
     pub parting: Option<String>,
     /// direction-curve, field, flow, cluster, cut: the side of that parting, seen along its points from outside.
@@ -39,11 +44,23 @@ pub struct Comb {
     /// direction-map: what the map's directions refer to. Default: "root".
     pub space: Option<Space>,
     /// bend: angle at the tip, degrees.
-    pub angle: Option<f64>,
+    pub angle: Option<LookValue>,
     /// lay-down: 0 leaves hairs as they are, 1 lays them on the skin.
-    pub amount: Option<f64>,
+    pub amount: Option<LookValue>,
     /// length: factor on the control hair's length.
-    pub value: Option<f64>,
+    pub value: Option<LookValue>,
+    /// chain: the name of the hair that is moved.
+    pub hair: Option<String>,
+    /// chain: instead of a name, the hair that stands nearest to this point, scene units.
+    #[serde(default, deserialize_with = "some_exactly")]
+    pub at: Option<[f64; 3]>,
+    /// chain: turns at its joints, one after another.
+    #[serde(default)]
+    pub turn: Vec<JointTurn>,
+    /// chain: where its tip goes, after the turns, scene units.
+    pub reach: Option<Keyed<Vector>>,
+    /// mirror: the plane; hair behind it (where its normal does not point) mirrors hair before it.
+    pub plane: Option<Plane>,
     /// field: vector fields, whose sum hair follows.
     #[serde(default)]
     pub primitive: Vec<Primitive>,
@@ -60,6 +77,8 @@ pub struct Comb {
     pub reverse: bool,
     /// cluster: level of the clusters, 0 for those of the file. Default: 0.
     pub level: Option<usize>,
+    /// trim: a mesh (PLY); hair ends where it first runs through it.
+    pub file: Option<PathBuf>,
     /// cut: where.
     pub shear: Option<Shear>,
     /// cut: hair gets the length of the shortest way around this ball to its plane. Default: it is cut where it meets the plane.
@@ -68,6 +87,76 @@ pub struct Comb {
 
 pub(super) fn one() -> f64 {
     1.0
+}
+
+fn whole() -> LookValue {
+    LookValue::constant(1.0)
+}
+
+fn none() -> LookValue {
+    LookValue::constant(0.0)
+}
+
+/// A turn of a chain at one of its joints.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct JointTurn {
+    /// The joint, 0 at the root.
+    pub joint: usize,
+    /// Axis and angle: a vector along the normal, u and normal x u of the root, as long as the angle in degrees.
+    pub turn: Keyed<Vector>,
+}
+
+impl Comb {
+    /// It at a frame: without key frames.
+    pub fn at(&self, frame: f64) -> Comb {
+        let one = |k: &Keyed<f64>| Keyed::constant(k.at(frame));
+        let three = |k: &Keyed<Vector>| Keyed::constant(Vector(k.vectors().at(frame)));
+        let value = |v: &LookValue| v.still(frame);
+        let mut out = self.clone();
+        (out.weight, out.curvature) = (value(&self.weight), value(&self.curvature));
+        for (to, from) in [
+            (&mut out.bend, &self.bend),
+            (&mut out.angle, &self.angle),
+            (&mut out.amount, &self.amount),
+            (&mut out.value, &self.value),
+        ] {
+            *to = from.as_ref().map(value);
+        }
+        (out.radius, out.falloff) = (self.radius.as_ref().map(one), self.falloff.as_ref().map(one));
+        out.reach = self.reach.as_ref().map(three);
+        out.turn.iter_mut().for_each(|t| t.turn = three(&t.turn));
+        for p in &mut out.primitive {
+            (p.strength, p.position, p.turn) = (one(&p.strength), three(&p.position), three(&p.turn));
+        }
+        for e in &mut out.element {
+            e.strength = one(&e.strength);
+            (e.velocity, e.at) = (e.velocity.as_ref().map(three), e.at.as_ref().map(three));
+        }
+        out
+    }
+
+    /// True if something of it has key frames.
+    pub fn is_animated(&self) -> bool {
+        let values = [&self.weight, &self.curvature].into_iter().chain(self.values().map(|(_, v)| v));
+        let one = self.radius.iter().chain(&self.falloff).chain(self.primitive.iter().map(|p| &p.strength));
+        let one = one.chain(self.element.iter().map(|e| &e.strength));
+        let three = self.reach.iter().chain(self.turn.iter().map(|t| &t.turn));
+        let three = three.chain(self.primitive.iter().flat_map(|p| [&p.position, &p.turn]));
+        let three = three.chain(self.element.iter().flat_map(|e| e.velocity.iter().chain(&e.at)));
+        values.map(|v| v.0.value.0.len()).chain(one.map(|k| k.0.len())).chain(three.map(|k| k.0.len())).any(|n| n > 1)
+    }
+
+    /// Values that only some kinds read, by key.
+    fn values(&self) -> impl Iterator<Item = (&'static str, &LookValue)> {
+        let all = [("bend", &self.bend), ("angle", &self.angle), ("amount", &self.amount), ("value", &self.value)];
+        all.into_iter().filter_map(|(key, v)| Some((key, v.as_ref()?)))
+    }
+
+    /// Every value that may vary over the skin, by key.
+    pub fn varied(&self) -> Vec<(&'static str, &LookValue)> {
+        [("weight", &self.weight), ("curvature", &self.curvature)].into_iter().chain(self.values()).collect()
+    }
 }
 
 /// What a combing operation does.
@@ -90,8 +179,14 @@ pub enum CombKind {
     Flow,
     /// Lets hairs follow the clusters that they are in.
     Cluster,
+    /// Moves a hair and its neighbours joint by joint, or by their tips.
+    Chain,
+    /// Gives hair on one side of a plane the mirrored shape of that on the other.
+    Mirror,
     /// Cuts hairs at planes.
     Cut,
+    /// Cuts hairs where they first run through a mesh.
+    Trim,
 }
 
 /// A side of a parting.
@@ -118,7 +213,9 @@ pub enum Space {
 impl Document<GroomFile> {
     /// Keys that belong to another kind are refused: nobody should tune a value that nothing reads.
     pub(super) fn check_comb(&self, key: &str, c: &Comb) -> Result<(), ConfigError> {
-        use CombKind::{Bend, Cluster, Cut, DirectionCurve, DirectionMap, Field, Flow, LayDown, Length};
+        use CombKind::{
+            Bend, Chain, Cluster, Cut, DirectionCurve, DirectionMap, Field, Flow, LayDown, Length, Mirror, Trim,
+        };
         let needed = match c.kind {
             DirectionCurve => "points",
             DirectionMap => "map",
@@ -129,13 +226,21 @@ impl Document<GroomFile> {
             // A body that lets something through is a flow by itself.
             Flow if c.panels.is_none() => "element",
             Flow => "panels",
-            Cluster => "",
+            Chain | Cluster => "",
+            Mirror => "plane",
+            Trim => "file",
             Cut => "shear",
         };
-        let given: [(&str, bool, &[CombKind]); 19] = [
+        let given: [(&str, bool, &[CombKind]); 25] = [
             ("points", c.points.is_some(), &[DirectionCurve]),
-            ("radius", c.radius.is_some(), &[DirectionCurve]),
-            ("falloff", c.falloff.is_some(), &[DirectionCurve]),
+            ("radius", c.radius.is_some(), &[DirectionCurve, Chain]),
+            ("falloff", c.falloff.is_some(), &[DirectionCurve, Chain]),
+            ("hair", c.hair.is_some(), &[Chain]),
+            ("at", c.at.is_some(), &[Chain]),
+            ("turn", !c.turn.is_empty(), &[Chain]),
+            ("reach", c.reach.is_some(), &[Chain]),
+            ("file", c.file.is_some(), &[Trim]),
+            ("plane", c.plane.is_some(), &[Mirror]),
             ("bend", c.bend.is_some(), &[DirectionCurve, DirectionMap, Field, Flow, Cluster]),
             ("parting", c.parting.is_some(), &[DirectionCurve, Field, Flow, Cluster, Cut]),
             ("side", c.side.is_some(), &[DirectionCurve, Field, Flow, Cluster, Cut]),
@@ -171,12 +276,56 @@ impl Document<GroomFile> {
             let help = "name one of the [[parting]] of this file";
             return Err(self.error(&format!("{key}.parting"), format!("there is no parting `{name}`"), help));
         }
-        let unit = [("weight", Some(c.weight)), ("falloff", c.falloff), ("bend", c.bend), ("amount", c.amount)];
-        for (name, value) in unit.into_iter().chain([("curvature", Some(c.curvature))]) {
-            self.within(&format!("{key}.{name}"), value.unwrap_or(0.0), 0.0, 1.0)?;
+        let unit = |name: &str| matches!(name, "weight" | "curvature" | "bend" | "amount");
+        for (name, v) in c.varied() {
+            let range = match name {
+                "angle" => [-720.0, 720.0],
+                _ if unit(name) => [0.0, 1.0],
+                _ => [0.0, 1e6],
+            };
+            self.check_value(&format!("{key}.{name}"), &varied("", v, range))?;
         }
-        self.within(&format!("{key}.radius"), c.radius.unwrap_or(1.0), 0.0, f64::MAX)?;
-        self.within(&format!("{key}.angle"), c.angle.unwrap_or(0.0), -720.0, 720.0)?;
-        self.within(&format!("{key}.value"), c.value.unwrap_or(1.0), 0.0, 1e6)
+        for (name, k, most) in [("radius", &c.radius, f64::MAX), ("falloff", &c.falloff, 1.0)] {
+            k.iter().try_for_each(|k| self.keyed(&format!("{key}.{name}"), k, |x| (0.0..=most).contains(x)))?;
+        }
+        let finite = |v: &Vector| v.0.iter().all(|x| x.abs() <= 1e9);
+        c.reach.iter().try_for_each(|k| self.keyed(&format!("{key}.reach"), k, finite))?;
+        c.turn
+            .iter()
+            .enumerate()
+            .try_for_each(|(i, t)| self.keyed(&format!("{key}.turn[{i}].turn"), &t.turn, finite))?;
+        if let Some(names) = &c.hairs {
+            for n in names.iter().filter(|n| !self.has_hair(n)) {
+                return Err(self.error(&format!("{key}.hairs"), format!("there is no hair `{n}`"), NO_HAIR));
+            }
+        }
+        if c.kind == Chain {
+            if c.hair.is_some() == c.at.is_some() || c.turn.is_empty() && c.reach.is_none() {
+                let help = "give `hair` or `at`, and `turn` or `reach`";
+                return Err(self.error(key, "does not say which hair moves, or how", help));
+            }
+            if let Some(n) = c.hair.as_ref().filter(|n| n.contains('*') || !self.has_hair(n)) {
+                return Err(self.error(&format!("{key}.hair"), format!("there is no hair `{n}`"), NO_HAIR));
+            }
+            c.at.into_iter().flatten().try_for_each(|x| self.within(&format!("{key}.at"), x, -1e9, 1e9))?;
+        }
+        c.plane.iter().try_for_each(|p| self.check_plane(&format!("{key}.plane"), p))
+    }
+
+    pub(super) fn has_hair(&self, pattern: &String) -> bool {
+        self.value.control.hair.iter().any(|h| is_named(&h.name, std::slice::from_ref(pattern)))
+    }
+
+    /// Checks a value, or key frames, each.
+    pub(super) fn keyed<T>(&self, key: &str, k: &Keyed<T>, good: impl Fn(&T) -> bool) -> Result<(), ConfigError> {
+        if !k.0.iter().all(|k| good(&k.value) && k.frame.abs() <= 1e9) {
+            return Err(self.error(key, "has a number that is out of range", "see the reference for what it may be"));
+        }
+        if !k.in_order() {
+            return Err(self.error(key, "key frames are not in order", "write one or more, each after the one before"));
+        }
+        Ok(())
     }
 }
+
+pub(super) const NO_HAIR: &str = "name a [[control.hair]] of this file, or the beginning of some with a *";

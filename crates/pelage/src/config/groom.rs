@@ -1,7 +1,7 @@
 //! The groom file: control hairs, how they are combed, and the layers of hair grown from maps.
 
 use super::cluster::{Cluster, ClusterEdit, ClusterLook, Scalp};
-use super::comb::Comb;
+use super::comb::{Comb, NO_HAIR};
 use super::document::{ConfigError, Document, Fixed, exactly};
 use super::look::{Clump, Collision, Curl, Emitter, Noise, Operator, Wave, WindLook};
 use super::simulate::{Material, Target, check_material};
@@ -349,6 +349,9 @@ pub struct Layer {
     /// Hairs per square centimetre. Required without `hairs`.
     #[serde(default = "unsaid")]
     pub density: Feature,
+    /// Hair grows in clusters only. Default: false.
+    #[serde(default)]
+    pub in_clusters: bool,
     /// Map that turns areas off: multiplies the density.
     pub on_off: Option<MapRef>,
     /// Length, scene units; with `hairs`, a factor on that of the control hairs. Required without them.
@@ -532,11 +535,8 @@ impl Document<GroomFile> {
             key,
             &[("density", !l.density.value.is_nan(), !by_hand), ("length", by_hand || !l.length.value.is_nan(), true)],
         )?;
-        for pattern in &l.hairs {
-            if !self.value.control.hair.iter().any(|h| is_named(&h.name, std::slice::from_ref(pattern))) {
-                let help = "name a [[control.hair]] of this file, or the beginning of some with a *";
-                return Err(self.error(&format!("{key}.hairs"), format!("there is no hair `{pattern}`"), help));
-            }
+        if let Some(n) = l.hairs.iter().find(|n| !self.has_hair(n)) {
+            return Err(self.error(&format!("{key}.hairs"), format!("there is no hair `{n}`"), NO_HAIR));
         }
         if by_hand {
             let length = if l.length.value.is_nan() { &constant(1.0) } else { &l.length };

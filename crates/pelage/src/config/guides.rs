@@ -1,9 +1,10 @@
 //! Combing along fields: vector fields, and flow around a body.
 
 use super::GroomFile;
-use super::comb::{Comb, one};
+use super::comb::Comb;
 use super::document::{ConfigError, Document, exactly, some_exactly};
 use super::groom::{Feature, some_points};
+use super::keyed::{Keyed, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -37,14 +38,14 @@ pub struct Primitive {
     /// wave: degrees; at 0 it begins at its steepest. Default: 0.
     pub phase: Option<f64>,
     /// Origin of its coordinates, scene units. Default: 0, 0, 0.
-    #[serde(default, deserialize_with = "exactly")]
-    pub position: [f64; 3],
+    #[serde(default = "origin")]
+    pub position: Keyed<Vector>,
     /// Turns its coordinates about x, then y, then z, degrees. Default: 0, 0, 0.
-    #[serde(default, deserialize_with = "exactly")]
-    pub turn: [f64; 3],
+    #[serde(default = "origin")]
+    pub turn: Keyed<Vector>,
     /// Strength against the others; negative turns it round. Default: 1.
-    #[serde(default = "one")]
-    pub strength: f64,
+    #[serde(default = "unit")]
+    pub strength: Keyed<f64>,
     /// How the strength falls with distance from the origin, or from the line. Default: it doesn't.
     pub falloff: Option<Falloff>,
     /// Lengths of its axes that count as distance 1, scene units. Default: 1, 1, 1.
@@ -56,6 +57,14 @@ pub struct Primitive {
     /// Acts on hair on the other side of dividers too. Default: false.
     #[serde(default)]
     pub across: bool,
+}
+
+fn origin() -> Keyed<Vector> {
+    Keyed::constant(Vector([0.0; 3]))
+}
+
+fn unit() -> Keyed<f64> {
+    Keyed::constant(1.0)
 }
 
 fn ones() -> [f64; 3] {
@@ -166,11 +175,9 @@ pub struct Element {
     /// What it is.
     pub kind: ElementKind,
     /// stream: velocity.
-    #[serde(default, deserialize_with = "some_exactly")]
-    pub velocity: Option<[f64; 3]>,
+    pub velocity: Option<Keyed<Vector>>,
     /// source, vortex: a point, scene units.
-    #[serde(default, deserialize_with = "some_exactly")]
-    pub at: Option<[f64; 3]>,
+    pub at: Option<Keyed<Vector>>,
     /// vortex: direction of its line.
     #[serde(default, deserialize_with = "some_exactly")]
     pub axis: Option<[f64; 3]>,
@@ -178,8 +185,8 @@ pub struct Element {
     #[serde(default, deserialize_with = "some_points")]
     pub points: Option<Vec<[f64; 3]>>,
     /// source: volume a time, negative for a sink. vortex, filament: circulation. Default: 1.
-    #[serde(default = "one")]
-    pub strength: f64,
+    #[serde(default = "unit")]
+    pub strength: Keyed<f64>,
     /// source, vortex, filament: within this distance the velocity falls to zero, scene units. Default: 0.1.
     #[serde(default = "tenth")]
     pub core: f64,
@@ -268,6 +275,14 @@ impl Document<GroomFile> {
         Ok(())
     }
 
+    pub(super) fn check_plane(&self, key: &str, p: &Plane) -> Result<(), ConfigError> {
+        if p.normal == [0.0; 3] || !p.point.iter().chain(&p.normal).all(|x| x.is_finite()) {
+            let help = "for example { point = [0.0, 8.0, 0.0], normal = [0.0, 1.0, 0.0] }";
+            return Err(self.error(key, "must be a finite point and a direction", help));
+        }
+        Ok(())
+    }
+
     fn check_shear(&self, key: &str, s: &Shear) -> Result<(), ConfigError> {
         let parts = s.part.is_some();
         self.keys(
@@ -275,11 +290,7 @@ impl Document<GroomFile> {
             &[("at", s.at.is_some(), !parts), ("front", s.front.is_some(), parts), ("back", s.back.is_some(), parts)],
         )?;
         for (name, plane) in [("at", s.at), ("part", s.part)] {
-            let Some(p) = plane else { continue };
-            if p.normal == [0.0; 3] || !p.point.iter().chain(&p.normal).all(|x| x.is_finite()) {
-                let help = "for example { point = [0.0, 8.0, 0.0], normal = [0.0, 1.0, 0.0] }";
-                return Err(self.error(&format!("{key}.{name}"), "must be a finite point and a direction", help));
-            }
+            plane.iter().try_for_each(|p| self.check_plane(&format!("{key}.{name}"), p))?;
         }
         let sides = [("front", &s.front), ("back", &s.back)];
         sides
@@ -317,12 +328,13 @@ impl Document<GroomFile> {
         for (name, x) in [("radius", p.radius), ("wavelength", p.wavelength)] {
             self.within(&format!("{key}.{name}"), x.unwrap_or(1.0), 1e-9, 1e9)?;
         }
-        let some = [("pitch", p.pitch), ("amplitude", p.amplitude), ("phase", p.phase), ("strength", Some(p.strength))];
+        let some = [("pitch", p.pitch), ("amplitude", p.amplitude), ("phase", p.phase)];
         for (name, x) in some {
             self.within(&format!("{key}.{name}"), x.unwrap_or(0.0), -1e9, 1e9)?;
         }
-        for x in p.position.iter().chain(&p.turn) {
-            self.within(&format!("{key}.position"), *x, -1e9, 1e9)?;
+        self.keyed(&format!("{key}.strength"), &p.strength, |x| x.abs() <= 1e9)?;
+        for (name, k) in [("position", &p.position), ("turn", &p.turn)] {
+            self.keyed(&format!("{key}.{name}"), k, |v| v.0.iter().all(|x| x.abs() <= 1e9))?;
         }
         for x in &p.shape {
             self.within(&format!("{key}.shape"), *x, 1e-9, 1e9)?;
@@ -383,13 +395,15 @@ impl Document<GroomFile> {
             ],
         )?;
         self.line(&format!("{key}.points"), e.points.as_ref())?;
-        for (name, v) in [("velocity", e.velocity), ("at", e.at), ("axis", e.axis)] {
-            v.iter().flatten().try_for_each(|x| self.within(&format!("{key}.{name}"), *x, -1e9, 1e9))?;
+        for (name, k) in [("velocity", &e.velocity), ("at", &e.at)] {
+            let good = |v: &Vector| v.0.iter().all(|x| x.abs() <= 1e9);
+            k.iter().try_for_each(|k| self.keyed(&format!("{key}.{name}"), k, good))?;
         }
+        e.axis.iter().flatten().try_for_each(|x| self.within(&format!("{key}.axis"), *x, -1e9, 1e9))?;
         if e.axis == Some([0.0; 3]) {
             return Err(self.error(&format!("{key}.axis"), "must be a direction", "for example [1.0, 0.0, 0.0]"));
         }
-        self.within(&format!("{key}.strength"), e.strength, -1e12, 1e12)?;
+        self.keyed(&format!("{key}.strength"), &e.strength, |x| x.abs() <= 1e12)?;
         self.within(&format!("{key}.core"), e.core, 0.0, 1e9)
     }
 

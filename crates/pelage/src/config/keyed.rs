@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{DeserializeOwned, Deserializer, Error as _, IntoDeserializer, MapAccess, SeqAccess, Visitor};
+use serde::ser::{Serialize, Serializer};
 use std::borrow::Cow;
 use std::fmt;
 use std::marker::PhantomData;
@@ -67,6 +68,13 @@ impl<T: fmt::Display> fmt::Display for Keyed<T> {
         }
         let keys: Vec<String> = self.0.iter().map(|k| format!("{}: {}", k.frame, k.value)).collect();
         write!(f, "[{}]", keys.join(", "))
+    }
+}
+
+/// As text.
+impl<T: fmt::Display> Serialize for Keyed<T> {
+    fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
+        s.collect_str(self)
     }
 }
 

@@ -20,6 +20,9 @@ impl Document<GroomFile> {
                 return Err(self.error(&format!("{at}.curl.per_clump"), "the layer has no clumps", help));
             }
         }
+        if l.in_clusters && self.value.cluster.is_empty() {
+            return Err(self.error(&format!("{at}.in_clusters"), "there are no clusters", "add a [[cluster]]"));
+        }
         if let Some(c) = &l.cluster {
             if self.value.cluster.is_empty() {
                 return Err(self.error(&format!("{at}.cluster"), "there are no clusters", "add a [[cluster]]"));
@@ -69,7 +72,7 @@ impl Document<GroomFile> {
         self.check_order(at, l)
     }
 
-    fn check_value(&self, at: &str, v: &Varied<'_>) -> Result<(), ConfigError> {
+    pub(super) fn check_value(&self, at: &str, v: &Varied<'_>) -> Result<(), ConfigError> {
         for k in &v.value.0.value.0 {
             self.within(at, k.value, v.range[0], v.range[1])?;
             self.within(at, k.frame, -1e9, 1e9)?;

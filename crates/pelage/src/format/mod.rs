@@ -6,6 +6,7 @@ pub mod csv;
 pub mod hair;
 pub mod image;
 pub mod mcap;
+pub mod nurbs;
 pub mod ply;
 pub mod usd;
 

@@ -46,14 +46,21 @@ pub(super) fn coordinates(run: &mut Runner<'_>, roots: &[SurfacePoint]) -> Resul
     Ok(roots.par_iter().map(|p| space.at(&view, p)).collect())
 }
 
-/// True for roots where hair grows; empty if it does everywhere.
-pub(super) fn growing(run: &mut Runner<'_>, roots: &[SurfacePoint]) -> Result<Vec<bool>, Error> {
-    let growth = &run.project.groom.value.scalp.growth;
-    if growth.is_empty() {
+/// True for roots where hair of a layer grows; empty if it does everywhere.
+pub(super) fn growing(run: &mut Runner<'_>, i: usize, roots: &[SurfacePoint]) -> Result<Vec<bool>, Error> {
+    let groom = &run.project.groom.value;
+    let (growth, within) = (&groom.scalp.growth, groom.layer[i].in_clusters);
+    if growth.is_empty() && !within {
         return Ok(Vec::new());
     }
     let at = coordinates(run, roots)?;
-    Ok(at.par_iter().map(|p| growth.iter().any(|line| scalp::inside(line, *p))).collect())
+    let drawn = |p: &[f64; 2]| growth.is_empty() || growth.iter().any(|line| scalp::inside(line, *p));
+    let mut out: Vec<bool> = at.par_iter().map(drawn).collect();
+    if within {
+        let of = owners(&*tree(run)?, &at, None);
+        out.iter_mut().zip(of).for_each(|(o, k)| *o &= k != NONE);
+    }
+    Ok(out)
 }
 
 /// The clusters of the groom.

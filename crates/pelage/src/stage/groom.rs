@@ -1,27 +1,21 @@
 //! Groom: control hairs placed on the rest skin and combed.
 
-use super::guides;
 use super::run::{Counts, Runner};
 use super::skin::Texel;
-use super::tables::{self, decode, encode, root_columns, roots_of, table, vector_columns, vectors_of};
+use super::tables::{decode, encode, table, vector_columns, vectors_of};
 use super::{Skin, SkinPose, What};
 use crate::Error;
-use crate::config::{Comb, CombKind as Kind, Side, Space};
 use crate::curves;
 use crate::format::ply;
 use crate::project::SkinAt;
-use pelage_geom::{Offsets, SurfacePoint, TiledMap, Vec3};
+use pelage_geom::{Offsets, SurfacePoint, Vec3};
 use pelage_groom::candidates::candidates;
-use pelage_groom::comb::{CombKind, CombOp, DirectionSpace, Guides, comb};
 use pelage_groom::control::{self, ControlHairs, PartingPiece, Sites};
-use pelage_groom::field::lengths::Shear;
-use pelage_groom::flow::trace::{Guard, Start};
 use pelage_groom::place::{Line, PlaceSettings, Placement, Single, place};
-use pelage_groom::push_up::{PushUp, push_up};
 use std::rc::Rc;
 
 /// Seed of the blue-noise roots of control hairs; no layer's seed has the upper half set.
-const CONTROL_SEED: u64 = 1 << 32;
+pub(super) const CONTROL_SEED: u64 = 1 << 32;
 
 /// Control hairs are combed by a person: more of them are a mistake of units.
 const MAX_CONTROL: usize = 1_000_000;
@@ -104,7 +98,7 @@ fn decode_sites(bytes: &[u8]) -> Option<Sites> {
 }
 
 /// Places control hairs at their length before combing.
-fn place_hairs(run: &mut Runner<'_>) -> Result<(ControlHairs, Sites, Counts), Error> {
+pub(super) fn place_hairs(run: &mut Runner<'_>) -> Result<(ControlHairs, Sites, Counts), Error> {
     let skin = skin(run)?;
     let groom = &run.project.groom.value;
     let (_, length) = run.project.control_length();
@@ -216,156 +210,4 @@ pub(super) fn view(skin: &Skin) -> control::Skin<'_> {
 pub(super) fn partings(run: &Runner<'_>) -> Vec<Vec<Vec3>> {
     let groom = &run.project.groom.value;
     groom.parting.iter().map(|p| p.points.iter().map(|q| Vec3::from(*q)).collect()).collect()
-}
-
-/// Control hairs after combing.
-pub fn combed(run: &mut Runner<'_>) -> Result<Rc<ControlHairs>, Error> {
-    if let Some(found) = &run.control {
-        return Ok(found.clone());
-    }
-    let hairs = match run.fetch(What::Comb).and_then(|e| decode_hairs(e.payload.first()?)) {
-        Some(found) => found,
-        None => comb_hairs(run)?,
-    };
-    let hairs = Rc::new(hairs);
-    run.control = Some(hairs.clone());
-    Ok(hairs)
-}
-
-fn comb_hairs(run: &mut Runner<'_>) -> Result<ControlHairs, Error> {
-    let mut hairs = match run.placed.take() {
-        Some(hairs) => hairs,
-        None => place_hairs(run)?.0,
-    };
-    let skin = skin(run)?;
-    let project = run.project;
-    let lines = partings(run);
-    let maps = comb_maps(run)?;
-    let control = &project.groom.value.control;
-    let millimetre = 1e-3 / project.shot.value.shot.meters_per_unit;
-    let clearance = control.clearance * millimetre;
-    let guard = Guard { surface: skin.bvh(), clearance };
-    let (guides, points) = (guides::guides(run, &hairs)?, hairs.points);
-    let trace: Vec<_> =
-        guides.iter().map(|g| g.as_ref().map(|g| |starts: &[Start]| g.lines(points, &guard, starts))).collect();
-    let combs = &project.groom.value.comb;
-    let shears: Vec<Option<Shear>> = combs.iter().map(|c| c.shear.as_ref().map(guides::shear)).collect();
-    let ops: Vec<CombOp<'_>> = combs
-        .iter()
-        .enumerate()
-        .map(|(i, c)| operation(run, c, &maps[i], trace[i].as_ref().map(|t| Guides(t)), shears[i].as_ref()))
-        .collect();
-    let done = comb(&view(&skin), &lines, &ops, &mut hairs);
-    let mut counts = Counts::from([
-        ("control hairs combed".to_owned(), done.iter().map(|c| c.combed).max().unwrap_or(0) as u64),
-        ("control hairs without a painted direction".to_owned(), done.iter().map(|c| c.unpainted as u64).sum()),
-    ]);
-    if control.push_up && control.clearance > 0.0 {
-        let settings = PushUp { step: millimetre, clearance };
-        let pushed = push_up(&view(&skin), skin.bvh(), &settings, &mut hairs);
-        for (name, n) in [
-            ("control hairs pushed out of the skin", pushed.pushed),
-            ("control hairs pushed past the normal", pushed.escaped),
-            ("control hairs that could not be cleared", pushed.uncleared),
-        ] {
-            counts.insert(name.to_owned(), n as u64);
-        }
-    }
-    run.keep(What::Comb, counts, &[("data.ply", &encode_hairs(&hairs))])?;
-    Ok(hairs)
-}
-
-/// Region and main map of every operation.
-fn comb_maps(run: &mut Runner<'_>) -> Result<Vec<[Option<TiledMap>; 2]>, Error> {
-    let mut out = Vec::new();
-    for c in &run.project.groom.value.comb {
-        let texel = if c.kind == Kind::DirectionMap { Texel::Direction } else { Texel::Value };
-        let region = c.region.as_ref().map(|m| run.map(m, Texel::Value)).transpose()?;
-        out.push([region, c.map.as_ref().map(|m| run.map(m, texel)).transpose()?]);
-    }
-    Ok(out)
-}
-
-fn operation<'a>(
-    run: &Runner<'_>,
-    c: &Comb,
-    [region, map]: &'a [Option<TiledMap>; 2],
-    guides: Option<Guides<'a>>,
-    shear: Option<&'a Shear>,
-) -> CombOp<'a> {
-    let curvature = c.curvature;
-    let bend = c.bend.unwrap_or(1.0);
-    let kind = match c.kind {
-        Kind::DirectionCurve => CombKind::DirectionCurve {
-            points: c.points.iter().flatten().map(|p| Vec3::from(*p)).collect(),
-            radius: c.radius.unwrap_or(f64::INFINITY),
-            falloff: c.falloff.unwrap_or(1.0),
-            bend,
-            curvature,
-        },
-        Kind::DirectionMap => CombKind::DirectionMap {
-            map: map.as_ref().expect("checked: the operation has a map"),
-            space: match c.space.unwrap_or_default() {
-                Space::Root => DirectionSpace::Root,
-                Space::World => DirectionSpace::World,
-            },
-            bend,
-            curvature,
-        },
-        Kind::Bend => CombKind::Bend { angle: c.angle.unwrap_or(0.0), map: map.as_ref(), curvature },
-        Kind::LayDown => CombKind::LayDown { amount: c.amount.unwrap_or(0.0), map: map.as_ref() },
-        Kind::Field | Kind::Flow | Kind::Cluster => {
-            CombKind::Follow { guides: guides.expect("made for these kinds"), bend, curvature }
-        }
-        Kind::Cut => CombKind::Cut {
-            shear: shear.expect("checked: a cut has its planes"),
-            scalp: c.scalp.as_ref().map(guides::ball),
-        },
-        Kind::Length => CombKind::Length { value: c.value.unwrap_or(1.0), map: map.as_ref() },
-    };
-    let parting = |name: &String| run.project.groom.value.parting.iter().position(|p| p.name == *name);
-    let side = match (c.parting.as_ref().and_then(parting), c.side) {
-        (Some(p), Some(Side::Left)) => Some((p as u32, 1)),
-        (Some(p), Some(Side::Right)) => Some((p as u32, -1)),
-        _ => None,
-    };
-    CombOp { kind, weight: c.weight, region: region.as_ref(), side }
-}
-
-fn encode_hairs(hairs: &ControlHairs) -> Vec<u8> {
-    let mut columns = root_columns(&hairs.root);
-    columns.push(("side", ply::Column::I32(hairs.side.iter().map(|s| i32::from(*s)).collect())));
-    columns.push(("parting", ply::Column::U32(hairs.parting.clone())));
-    columns.push(("border", ply::Column::U8(hairs.border.iter().map(|b| u8::from(*b)).collect())));
-    columns.push(("single", ply::Column::U32(hairs.single.clone())));
-    columns.push(("cut", ply::Column::F32(hairs.cut.clone())));
-    let comment = format!("control hairs, {} points each: n, du, dv along [N, dU, N x dU] from the root", hairs.points);
-    encode(
-        &comment,
-        &[
-            table("hair", columns),
-            table("point", vector_columns(["n", "du", "dv"], &hairs.local)),
-            table("shape", vec![("points", ply::Column::U32(vec![hairs.points as u32]))]),
-        ],
-    )
-}
-
-fn decode_hairs(bytes: &[u8]) -> Option<ControlHairs> {
-    let file: tables::Tables = decode(bytes)?;
-    let (hair, point) = (file.get("hair")?, file.get("point")?);
-    let points = *file.get("shape")?.u32("points")?.first()? as usize;
-    let ply::Column::I32(side) = hair.column("side")? else { return None };
-    let ply::Column::U8(border) = hair.column("border")? else { return None };
-    let local = vectors_of(point, ["n", "du", "dv"])?;
-    (local.len() == hair.rows * points).then_some(())?;
-    Some(ControlHairs {
-        points,
-        root: roots_of(hair)?,
-        local,
-        side: side.iter().map(|s| *s as i8).collect(),
-        parting: hair.u32("parting")?.to_vec(),
-        border: border.iter().map(|b| *b != 0).collect(),
-        single: hair.u32("single")?.to_vec(),
-        cut: hair.f32("cut")?.to_vec(),
-    })
 }

@@ -1,19 +1,22 @@
 //! Fields that control hairs are combed along.
 
 use super::look::barrier;
-use super::run::Runner;
+use super::run::{Counts, Runner};
 use super::skin::Texel;
-use super::{clusters, groom};
+use super::tables::{decode, encode, table};
+use super::{What, clusters, groom};
 use crate::Error;
-use crate::config::{Ball, Comb, CombKind, Element, ElementKind, Orientation, Panels, Plane, Primitive, Region, Shear};
-use crate::format::ply;
+use crate::config::{
+    Ball, Comb, CombKind, Element, ElementKind, Keyed, Orientation, Panels, Plane, Primitive, Region, Shear, Vector,
+};
+use crate::format::ply::{self, Column};
 use nalgebra::UnitQuaternion;
 use pelage_geom::{Bvh, Mesh, Pose, TiledMap, Vec3};
 use pelage_groom::cluster::Tree;
 use pelage_groom::control::ControlHairs;
 use pelage_groom::field::{self, Falloff, GuideField, lengths};
 use pelage_groom::flow::trace::{Guard, Lines, Start, Trace, trace};
-use pelage_groom::flow::{self, Body, Fast, Grid, OPENING, coarse};
+use pelage_groom::flow::{self, Body, Factored, Fast, Grid, OPENING, coarse};
 use std::sync::Arc;
 
 /// Cells along the longest side of the box that lines can come to: velocities between are off by 1e-4 in the middle, and more
@@ -52,9 +55,8 @@ pub(super) struct Flow {
 }
 
 /// What the operations of a groom let hairs follow; `None` for those that follow nothing.
-pub(super) fn guides(run: &mut Runner<'_>, hairs: &ControlHairs) -> Result<Vec<Option<Guides>>, Error> {
-    let project = run.project;
-    let each = project.groom.value.comb.iter().enumerate();
+pub(super) fn guides(run: &mut Runner<'_>, combs: &[Comb], hairs: &ControlHairs) -> Result<Vec<Option<Guides>>, Error> {
+    let each = combs.iter().enumerate();
     each.map(|(i, c)| match c.kind {
         CombKind::Field => Ok(Some(Guides::Field(field_of(c)))),
         CombKind::Flow => Ok(Some(Guides::Flow(flow_of(run, i, c)?))),
@@ -118,6 +120,11 @@ fn points(p: Option<&Vec<[f64; 3]>>) -> Vec<Vec3> {
     p.into_iter().flatten().map(|p| Vec3::from(*p)).collect()
 }
 
+/// A vector without key frames.
+fn now(k: &Keyed<Vector>) -> Vec3 {
+    k.vectors().at(0.0).into()
+}
+
 fn vector(v: Option<[f64; 3]>) -> Vec3 {
     Vec3::from(v.unwrap_or_default())
 }
@@ -162,9 +169,9 @@ fn primitive(p: &Primitive) -> field::Primitive {
         },
     };
     field::Primitive {
-        position: p.position.into(),
-        rotation: turned(p.turn),
-        strength: p.strength,
+        position: now(&p.position),
+        rotation: turned(p.turn.vectors().at(0.0)),
+        strength: p.strength.at(0.0),
         falloff,
         shape: p.shape.into(),
         domain: p.domain.iter().map(region).collect(),
@@ -204,9 +211,9 @@ pub(super) fn ball(b: &Ball) -> lengths::Sphere {
 }
 
 fn element(e: &Element) -> flow::Element {
-    let (at, strength, core) = (vector(e.at), e.strength, e.core);
+    let (at, strength, core) = (e.at.as_ref().map_or(Vec3::zeros(), now), e.strength.at(0.0), e.core);
     match e.kind {
-        ElementKind::Stream => flow::Element::Stream { velocity: vector(e.velocity) },
+        ElementKind::Stream => flow::Element::Stream { velocity: e.velocity.as_ref().map_or(Vec3::zeros(), now) },
         ElementKind::Source => flow::Element::Source { at, strength, core },
         ElementKind::Vortex => flow::Element::Vortex { at, axis: vector(e.axis), strength, core },
         ElementKind::Filament => flow::Element::Filament { points: points(e.points.as_ref()), strength, core },
@@ -219,10 +226,19 @@ fn flow_of(run: &mut Runner<'_>, i: usize, c: &Comb) -> Result<Flow, Error> {
     Ok(Flow { element, body, reverse: c.reverse })
 }
 
-/// Panels of a flow with the strengths that let through what is asked.
-fn body_of(run: &mut Runner<'_>, i: usize, p: &Panels, element: &[flow::Element]) -> Result<(Body, Vec<f64>), Error> {
-    let skin = groom::skin(run)?;
-    let panels = match run.project.panels.get(&i) {
+fn unsound(run: &Runner<'_>, i: usize, e: &flow::FlowError) -> Error {
+    let help = "change `panels.most`, or give a closed mesh as `panels.file`";
+    run.project.groom.error(&format!("comb[{i}].panels"), e.to_string(), help).into()
+}
+
+/// Panels of an operation, factored: elements and speeds can change without doing it again.
+pub(super) fn panels(run: &mut Runner<'_>, i: usize) -> Result<Body, Error> {
+    let what = What::Panels(i as u32);
+    if let Some(found) = run.fetch(what).and_then(|e| decode_body(e.payload.first()?)) {
+        return Ok(found);
+    }
+    let p = run.project.groom.value.comb[i].panels.clone().expect("the operation has panels");
+    let mesh = match run.project.panels.get(&i) {
         Some(file) => ply::read_mesh(&file.path)?.mesh,
         None => {
             let barrier = barrier(run)?;
@@ -230,15 +246,46 @@ fn body_of(run: &mut Runner<'_>, i: usize, p: &Panels, element: &[flow::Element]
             coarse(whole, &Pose::new(whole, topology, whole.position.clone()).normal, p.most)
         }
     };
+    let body = Body::new(&mesh.position, &mesh.triangle).map_err(|e| unsound(run, i, &e))?;
+    let position = |x: usize| Column::F64(mesh.position.iter().map(|p| p[x]).collect());
+    let corner = |x: usize| Column::U32(mesh.triangle.iter().map(|t| t[x]).collect());
+    let factored = body.factored();
+    let file = encode(
+        "panels; the factored matrix of the velocities that they induce on each other; which of its rows stands where",
+        &[
+            table("vertex", vec![("x", position(0)), ("y", position(1)), ("z", position(2))]),
+            table(
+                "panel",
+                vec![("a", corner(0)), ("b", corner(1)), ("c", corner(2)), ("row", Column::U32(factored.row.clone()))],
+            ),
+            table("matrix", vec![("value", Column::F64(factored.matrix.clone()))]),
+        ],
+    );
+    let counts = Counts::from([("panels".to_owned(), body.panels().len() as u64)]);
+    run.keep(what, counts, &[("data.ply", &file)])?;
+    Ok(body)
+}
+
+fn decode_body(bytes: &[u8]) -> Option<Body> {
+    let file = decode(bytes)?;
+    let (vertex, panel) = (file.get("vertex")?, file.get("panel")?);
+    let of = |name: &str| vertex.f64(name);
+    let (x, y, z) = (of("x")?, of("y")?, of("z")?);
+    let position: Vec<[f64; 3]> = (0..vertex.rows).map(|k| [x[k], y[k], z[k]]).collect();
+    let (a, b, c) = (panel.u32("a")?, panel.u32("b")?, panel.u32("c")?);
+    let triangle: Vec<[u32; 3]> = (0..panel.rows).map(|k| [a[k], b[k], c[k]]).collect();
+    let matrix = file.get("matrix")?.f64("value")?.to_vec();
+    Body::again(&position, &triangle, Factored { matrix, row: panel.u32("row")?.to_vec() })
+}
+
+/// Panels of a flow with the strengths that let through what is asked.
+fn body_of(run: &mut Runner<'_>, i: usize, p: &Panels, element: &[flow::Element]) -> Result<(Body, Vec<f64>), Error> {
+    let skin = groom::skin(run)?;
+    let body = panels(run, i)?;
     let map = p.through.map().map(|m| run.map(&m, Texel::Value)).transpose()?;
-    let wrong = |e: flow::FlowError| {
-        let help = "change `panels.most`, or give a closed mesh as `panels.file`";
-        Error::from(run.project.groom.error(&format!("comb[{i}].panels"), e.to_string(), help))
-    };
-    let body = Body::new(&panels.position, &panels.triangle).map_err(wrong)?;
     let through: Vec<f64> =
         body.panels().iter().map(|panel| speed(&skin.mesh, skin.bvh(), p, map.as_ref(), panel.centre)).collect();
-    let strength = body.solve(element, &through).map_err(wrong)?;
+    let strength = body.solve(element, &through).map_err(|e| unsound(run, i, &e))?;
     Ok((body, strength))
 }
 

@@ -4,7 +4,7 @@ use super::plan_kept::hairs_of;
 use super::run::{Counts, Runner};
 use super::skin::Texel;
 use super::tables::{decode, encode, id_columns, ids_of, root_columns, roots_of, table, vector_columns, vectors_of};
-use super::{Skin, What, candidate_density, clusters, groom, guides, kept, layer_seed};
+use super::{Skin, What, candidate_density, clusters, comb, groom, guides, kept, layer_seed};
 use crate::Error;
 use crate::config::{Feature, Guard, GuideChoice, is_named};
 use crate::format::ply::Column;
@@ -125,7 +125,7 @@ fn by_hand(run: &mut Runner<'_>, i: usize) -> Result<Vec<u32>, Error> {
     if wanted.is_empty() {
         return Ok(Vec::new());
     }
-    let hairs = groom::combed(run)?;
+    let hairs = comb::combed(run)?;
     let mut found: Vec<(u32, u32)> = hairs.single.iter().enumerate().map(|(h, s)| (*s, h as u32)).collect();
     found.retain(|(s, _)| groom.control.hair.get(*s as usize).is_some_and(|h| is_named(&h.name, wanted)));
     found.sort_unstable();
@@ -134,7 +134,7 @@ fn by_hand(run: &mut Runner<'_>, i: usize) -> Result<Vec<u32>, Error> {
 
 /// Roots of such a layer; a hair is named by its place among the control hairs of the file.
 fn roots_by_hand(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
-    let (skin, hairs, found) = (groom::skin(run)?, groom::combed(run)?, by_hand(run, i)?);
+    let (skin, hairs, found) = (groom::skin(run)?, comb::combed(run)?, by_hand(run, i)?);
     let seed = layer_seed(&run.project.groom.value.layer[i].name);
     let of = |h: &u32| hairs.root[*h as usize];
     Ok(Roots {
@@ -164,7 +164,7 @@ fn grow(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
         candidates = search(&skin, seed, needed);
     }
     let mut found = find_roots(&skin.mesh, &skin.topology, &candidates, &density, seed);
-    let growing = clusters::growing(run, &found.root)?;
+    let growing = clusters::growing(run, i, &found.root)?;
     if !growing.is_empty() {
         found = kept_roots(&found, &growing);
     }
@@ -219,7 +219,7 @@ pub fn weights(run: &mut Runner<'_>, i: usize) -> Result<Weights, Error> {
     let own = by_hand(run, i)?;
     if !own.is_empty() {
         // Hairs may have been left out.
-        let (control, roots) = (groom::combed(run)?, roots(run, i)?);
+        let (control, roots) = (comb::combed(run)?, roots(run, i)?);
         let place = |id: &u64| own.iter().position(|h| u64::from(control.single[*h as usize]) == id & 0xffff_ffff);
         let hair =
             roots.id.iter().map(|id| [own[place(id).expect("hairs of the layer are control hairs")]; 3]).collect();
@@ -236,7 +236,7 @@ pub fn weights(run: &mut Runner<'_>, i: usize) -> Result<Weights, Error> {
     let (choice, seed) = (layer.guides, u64::from(layer_seed(&layer.name)));
     let mut divided = 0;
     if !dividers.is_empty() {
-        let control = groom::combed(run)?;
+        let control = comb::combed(run)?;
         let at = |roots: &[SurfacePoint]| roots.iter().map(|p| skin.mesh.point(p)).collect::<Vec<_>>();
         divided = respect(&dividers, &at(&roots.root), &at(&control.root), &mut found.hair, &mut found.weight);
     }
@@ -331,7 +331,7 @@ pub(super) fn feature(run: &mut Runner<'_>, what: What, i: usize, roots: &Roots)
     let seed = u64::from(layer_seed(&layer.name));
     let mut values = feature_column(roots, &source, seed);
     if name == "length" && !run.project.groom.value.layer[i].hairs.is_empty() {
-        let (control, own) = (groom::combed(run)?, by_hand(run, i)?);
+        let (control, own) = (comb::combed(run)?, by_hand(run, i)?);
         for (value, id) in values.iter_mut().zip(&roots.id) {
             let hair = own.iter().find(|h| u64::from(control.single[**h as usize]) == id & 0xffff_ffff);
             *value *= hair.map_or(0.0, |h| control.length(*h as usize)) as f32;

@@ -2,14 +2,18 @@
 
 use super::look::{self, Displaced};
 use super::run::{Counts, Runner};
-use super::{What, curves, groom, instance, simulate};
+use super::{What, comb, curves, groom, instance, simulate};
 use crate::Error;
 use crate::config::{CombKind, Target};
 use crate::format::mcap;
 use crate::project::SkinAt;
 use pelage_geom::Vec3;
+use pelage_groom::control::ControlHairs;
 use pelage_groom::instance::Roots;
-use pelage_groom::interpolate::{Blend, ControlPose, cut_lengths, interpolate, pose_controls, root_positions};
+use pelage_groom::interpolate::{
+    Blend, ControlPose, cut_lengths, interpolate, local_controls, pose_controls, root_positions, seen_from_roots,
+    to_roots,
+};
 use rayon::prelude::*;
 use std::rc::Rc;
 
@@ -35,8 +39,8 @@ fn layer(run: &mut Runner<'_>, i: usize) -> Result<Rc<LayerHairs>, Error> {
     let roots = instance::roots(run, i)?;
     let (hair, weight) = instance::weights(run, i)?;
     let mut length = instance::column(run, What::Length(i), i)?;
-    if run.project.groom.value.comb.iter().any(|c| c.kind == CombKind::Cut) {
-        cut_lengths(&hair, &weight, &groom::combed(run)?.cut, &mut length);
+    if run.project.groom.value.comb.iter().any(|c| matches!(c.kind, CombKind::Cut | CombKind::Trim)) {
+        cut_lengths(&hair, &weight, &comb::combed(run)?.cut, &mut length);
     }
     let points = run.project.base_points(i);
     let most = points.max(run.project.points(i));
@@ -110,22 +114,46 @@ pub fn undisplaced(run: &mut Runner<'_>, i: usize) -> Result<Vec<[f32; 3]>, Erro
     }
 }
 
+/// Control hairs that hair of a step is blended from.
+fn controls(run: &mut Runner<'_>, what: What) -> Result<Rc<ControlHairs>, Error> {
+    match what {
+        What::Frame(_, f) if run.project.combs_move() => comb::combed_at(run, f),
+        _ => comb::combed(run),
+    }
+}
+
 /// Hairs blended from control hairs, and how many had directions that cancelled.
 fn blended(run: &mut Runner<'_>, what: What, i: usize, at: &SkinAt) -> Result<(Vec<[f32; 3]>, usize), Error> {
     let skin = groom::skin(run)?;
     let layer = layer(run, i)?;
     let pose = groom::pose(run, at)?;
+    let from_roots = run.project.groom.value.layer[i].root_frames;
     let control = match (what, run.project.target(i)) {
         (What::Frame(_, f), Target::ControlHairs) => {
             let simulated = simulate::positions(run, i, f)?;
-            let lines: Vec<Vec3> = simulated.par_iter().map(|p| Vec3::from(p.map(f64::from))).collect();
-            ControlPose::from_polylines(&lines, run.project.segments() + 1, layer.points)
+            let mut lines: Vec<Vec3> = simulated.par_iter().map(|p| Vec3::from(p.map(f64::from))).collect();
+            let points = run.project.segments() + 1;
+            if from_roots {
+                let control = &comb::combed(run)?.root;
+                seen_from_roots(&mut lines, points, control, &skin.mesh, &skin.topology, &pose);
+            }
+            ControlPose::from_polylines(&lines, points, layer.points)
         }
-        _ => pose_controls(&*groom::combed(run)?, &skin.mesh, &skin.topology, &pose, layer.points),
+        _ if from_roots => local_controls(&*controls(run, what)?, layer.points),
+        _ => pose_controls(&*controls(run, what)?, &skin.mesh, &skin.topology, &pose, layer.points),
     };
     let root = root_positions(&skin.mesh, &pose, &layer.roots.root, skin.origin());
-    let blend = Blend { root: &root, hair: &layer.hair, weight: &layer.weight, length: &layer.length };
+    let origin = vec![[0.0; 3]; if from_roots { root.len() } else { 0 }];
+    let blend = Blend {
+        root: if from_roots { &origin } else { &root },
+        hair: &layer.hair,
+        weight: &layer.weight,
+        length: &layer.length,
+    };
     let mut out = vec![[0.0f32; 3]; layer.roots.id.len() * layer.points];
     let found = interpolate(&blend, &control, &mut out);
+    if from_roots {
+        to_roots(&skin.mesh, &skin.topology, &pose, &layer.roots.root, &root, layer.points, &mut out);
+    }
     Ok((out, found.cancelled_hairs))
 }

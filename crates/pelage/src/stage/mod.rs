@@ -19,6 +19,7 @@ mod plan_simulate;
 mod run;
 mod skin;
 
+pub mod comb;
 pub mod curves;
 pub mod export;
 pub mod groom;

@@ -5,7 +5,7 @@ use super::plan_kept::hairs_of;
 use super::plan_light::shadows;
 use super::plan_look::finished_rest;
 use crate::cache::{Field, Key, Recipe};
-use crate::config::{ExportFormat, Feature, MapRef, Target};
+use crate::config::{ExportFormat, Feature, GuideChoice, MapRef, Target};
 use crate::project::{Project, SkinAt};
 use crate::timeline::Timeline;
 use std::collections::BTreeMap;
@@ -17,8 +17,12 @@ pub enum What {
     Curves,
     /// Sites and roots of the control hairs.
     Place,
+    /// Panels that the flow of that operation of combing goes around, factored.
+    Panels(u32),
     /// Control hairs after combing.
     Comb,
+    /// Control hairs after combing at a frame, where combing has key frames.
+    CombAt(i32),
     /// Blue-noise candidate roots for a layer.
     Candidates(usize),
     /// Roots of a layer's hairs.
@@ -90,7 +94,8 @@ pub struct Plan {
 pub(super) mod version {
     pub const CURVES: u32 = 1;
     pub const PLACE: u32 = 1;
-    pub const COMB: u32 = 4;
+    pub const PANELS: u32 = 1;
+    pub const COMB: u32 = 5;
     pub const CANDIDATES: u32 = 1;
     pub const ROOTS: u32 = 1;
     pub const KEPT: u32 = 1;
@@ -188,6 +193,9 @@ impl Plan {
             Target::Off if r.project.curves.is_some() => &[What::Curves, What::Rest(0)],
             Target::EveryHair => &[simulated],
             Target::ControlHairs => &[simulated, hairs_of(r.project, i), What::Weights(i), What::Length(i)],
+            Target::Off if r.project.combs_move() => {
+                &[What::CombAt(frame), What::Comb, hairs_of(r.project, i), What::Weights(i), What::Length(i)]
+            }
             Target::Off => &[What::Comb, hairs_of(r.project, i), What::Weights(i), What::Length(i)],
         };
         let name = format!("interpolate/{}/{frame}", r.project.groom.value.layer[i].name);
@@ -198,7 +206,21 @@ impl Plan {
     fn add_groom(&mut self, r: &Reader<'_>) {
         let (plan, project) = (self, r.project);
         plan.add(What::Place, "groom/place".into(), Stage::Groom, r.place(), &[]);
-        plan.add(What::Comb, "groom/comb".into(), Stage::Groom, r.comb(), &[What::Place]);
+        let mut reads = vec![What::Place];
+        for (i, c) in project.groom.value.comb.iter().enumerate() {
+            if let Some(panels) = &c.panels {
+                let what = What::Panels(i as u32);
+                plan.add(what, format!("groom/panels[{i}]"), Stage::Groom, r.panels(i, panels), &[]);
+                reads.push(what);
+            }
+        }
+        plan.add(What::Comb, "groom/comb".into(), Stage::Groom, r.comb(None), &reads);
+        if project.combs_move() {
+            for frame in project.frames.keys() {
+                let name = format!("groom/comb/{frame}");
+                plan.add(What::CombAt(*frame), name, Stage::Groom, r.comb(Some(*frame)), &reads);
+            }
+        }
         for (i, layer) in project.groom.value.layer.iter().enumerate() {
             let name = |part: &str| format!("instance/{part}/{}", layer.name);
             let mut add = |what, part: &str, recipe, reads: &[What]| {
@@ -294,6 +316,11 @@ impl What {
         }
     }
 
+    /// The frame of combing that it is; `None` at rest.
+    pub fn comb_frame(self) -> Option<i32> {
+        if let What::CombAt(f) = self { Some(f) } else { None }
+    }
+
     /// The layer that it belongs to, if it belongs to one.
     pub fn layer(self) -> Option<usize> {
         match self {
@@ -305,7 +332,7 @@ impl What {
             | What::Finished(i) => Some(i),
             What::Simulate(i, _) | What::Frame(i, _) | What::Clump(i, _) => Some(i),
             What::Length(i) | What::Width(i) | What::Opacity(i) | What::Color(i) => Some(i),
-            What::Curves | What::Place | What::Comb | What::Hits(_) => None,
+            What::Curves | What::Place | What::Panels(_) | What::Comb | What::CombAt(_) | What::Hits(_) => None,
             What::Shadow(..) | What::Export(_) | What::Still | What::Sheet | What::Picture(_) | What::Turn(_) => None,
         }
     }
@@ -418,7 +445,7 @@ impl<'a> Reader<'a> {
         let layer = &self.project.groom.value.layer[i];
         let r = Recipe::new("instance/roots", version::ROOTS);
         let r = r.with(self.feature("density", &format!("layer[{i}].density"), &layer.density));
-        self.growth(r.with(layer.on_off.iter().flat_map(|m| self.map(&format!("layer[{i}].on_off"), m))))
+        self.growth(i, r.with(layer.on_off.iter().flat_map(|m| self.map(&format!("layer[{i}].on_off"), m))))
     }
 
     /// What the column `part` of a layer reads of its guard hairs; nothing if it has none.
@@ -479,7 +506,11 @@ impl<'a> Reader<'a> {
             Target::EveryHair => self.in_shot("simulate.segments (points)"),
             _ => self.in_groom(&format!("layer[{i}].points")),
         };
-        r.param("points", self.project.base_points(i), label)
+        let r = r.param("points", self.project.base_points(i), label);
+        match self.project.groom.value.layer[i].root_frames {
+            true => r.param("root_frames", true, self.in_groom(&format!("layer[{i}].root_frames"))),
+            false => r,
+        }
     }
 
     fn frame(&self, i: usize, at: &SkinAt, frame: i32) -> Recipe {

@@ -2,7 +2,7 @@
 
 use super::plan::{Reader, version};
 use crate::cache::Recipe;
-use crate::config::{Comb, CombKind, Parting};
+use crate::config::{Comb, CombKind, Panels, Parting};
 
 impl Reader<'_> {
     /// What placing control hairs reads.
@@ -45,14 +45,14 @@ impl Reader<'_> {
         r
     }
 
-    /// What combing reads.
-    pub(super) fn comb(&self) -> Recipe {
+    /// What combing reads at a frame, or at rest.
+    pub(super) fn comb(&self, frame: Option<i32>) -> Recipe {
         let groom = &self.project.groom.value;
         let mut r = self.unit(self.rest(Recipe::new("groom/comb", version::COMB)));
         r = r.param("points", groom.control.points, self.in_groom("control.points"));
         let (key, length) = self.project.control_length();
         r = r.with(self.feature("length", &key, &length));
-        for (i, c) in groom.comb.iter().enumerate() {
+        for (i, c) in self.project.combs(frame).iter().enumerate() {
             r = self.comb_fields(r, i, c);
         }
         let control = &groom.control;
@@ -76,16 +76,20 @@ impl Reader<'_> {
     }
 
     /// What says where hair grows.
-    pub(super) fn growth(&self, mut r: Recipe) -> Recipe {
-        let growth = &self.project.groom.value.scalp.growth;
-        if growth.is_empty() {
-            return r;
+    pub(super) fn growth(&self, i: usize, mut r: Recipe) -> Recipe {
+        let groom = &self.project.groom.value;
+        let growth = &groom.scalp.growth;
+        if groom.layer[i].in_clusters {
+            let name = format!("layer[{i}].in_clusters");
+            r = self.clusters(self.rest(r.param("in_clusters", true, self.in_groom(&name))));
+        } else if !growth.is_empty() {
+            r = self.scalp(r);
         }
         for (k, line) in growth.iter().enumerate() {
             let name = format!("scalp.growth[{k}]");
             r = r.param(&name, format!("{line:?}"), self.in_groom(&name));
         }
-        self.scalp(r)
+        r
     }
 
     /// What clusters read.
@@ -112,21 +116,26 @@ impl Reader<'_> {
             }
         };
         add("kind", Some(format!("{:?}", c.kind)));
-        add("weight", Some(c.weight.to_string()));
         add("points", c.points.as_ref().map(|p| format!("{p:?}")));
-        add("radius", c.radius.map(|x| x.to_string()));
-        add("falloff", c.falloff.map(|x| x.to_string()));
-        add("bend", c.bend.map(|x| x.to_string()));
-        add("curvature", Some(c.curvature.to_string()));
+        add("radius", c.radius.as_ref().map(ToString::to_string));
+        add("falloff", c.falloff.as_ref().map(ToString::to_string));
+        add("hairs", c.hairs.as_ref().map(|n| format!("{n:?}")));
+        add("hair", c.hair.clone());
+        add("at", c.at.map(|p| format!("{p:?}")));
+        add("reach", c.reach.as_ref().map(ToString::to_string));
         // A parting's name means nothing by itself: its place in the list does.
         let parting = |n: &String| self.project.groom.value.parting.iter().position(|p| p.name == *n);
         add("parting", c.parting.as_ref().and_then(parting).map(|p| p.to_string()));
         add("side", c.side.map(|s| format!("{s:?}")));
         add("space", c.space.map(|s| format!("{s:?}")));
-        add("angle", c.angle.map(|x| x.to_string()));
-        add("amount", c.amount.map(|x| x.to_string()));
         add("level", c.level.map(|x| x.to_string()));
-        add("value", c.value.map(|x| x.to_string()));
+        for (key, v) in c.varied() {
+            r = r.with(self.value(&name(key), &name(key), v, 0.0));
+        }
+        if c.hairs.is_some() || c.hair.is_some() {
+            let names: Vec<&String> = self.project.groom.value.control.hair.iter().map(|h| &h.name).collect();
+            r = r.param("names", format!("{names:?}"), self.in_groom("control.hair"));
+        }
         for (key, map) in [("region", &c.region), ("map", &c.map)] {
             r = r.with(map.iter().flat_map(|m| self.map(&name(key), m)));
         }
@@ -143,6 +152,8 @@ impl Reader<'_> {
             ("divider", serde_json::to_value(&c.divider)),
             ("element", serde_json::to_value(&c.element)),
             ("shear", serde_json::to_value(&c.shear)),
+            ("turn", serde_json::to_value(&c.turn)),
+            ("plane", serde_json::to_value(c.plane)),
             ("scalp", serde_json::to_value(c.scalp)),
         ];
         for (key, value) in guides {
@@ -154,9 +165,22 @@ impl Reader<'_> {
             let name = format!("comb[{i}].reverse");
             r = r.param(&name, true, self.in_groom(&name));
         }
+        if let Some(file) = self.project.trims.get(&i) {
+            r = r.file(&format!("comb[{i}].file"), &file.hash, file.label.clone());
+        }
         let Some(panels) = &c.panels else { return r };
         let name = |key: &str| format!("comb[{i}].panels.{key}");
         r = r.with(self.feature(&name("through"), &name("through"), &panels.through));
+        self.panels_of(i, panels, r)
+    }
+
+    /// What the panels of an operation read.
+    pub(super) fn panels(&self, i: usize, panels: &Panels) -> Recipe {
+        self.panels_of(i, panels, self.rest(Recipe::new("groom/panels", version::PANELS)))
+    }
+
+    fn panels_of(&self, i: usize, panels: &Panels, r: Recipe) -> Recipe {
+        let name = |key: &str| format!("comb[{i}].panels.{key}");
         match self.project.panels.get(&i) {
             Some(file) => r.file(&name("file"), &file.hash, file.label.clone()),
             None => r.param(&name("most"), panels.most, self.in_groom(&name("most"))),

@@ -272,7 +272,7 @@ impl Reader<'_> {
     }
 
     /// Fields of a parameter that varies over the skin, at a frame.
-    fn value(&self, name: &str, key: &str, v: &LookValue, frame: f64) -> Vec<Field> {
+    pub(super) fn value(&self, name: &str, key: &str, v: &LookValue, frame: f64) -> Vec<Field> {
         let at = self.in_groom(key);
         let mut r = Recipe::new("", 0).param(name, v.at(frame), at.clone());
         if v.0.noise != 0.0 {

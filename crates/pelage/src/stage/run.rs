@@ -109,6 +109,8 @@ pub struct Runner<'a> {
     pub(super) turning: Option<(pelage_light::Camera, [f64; 3])>,
     pub(super) placed: Option<pelage_groom::control::ControlHairs>,
     pub(super) control: Option<Rc<pelage_groom::control::ControlHairs>>,
+    /// Control hairs of the frame that was last asked for.
+    pub(super) control_at: Option<(i32, Rc<pelage_groom::control::ControlHairs>)>,
     pub(super) curves: Option<Rc<super::curves::CurveHair>>,
     pub(super) colliders: Option<(usize, Rc<super::body::Colliders>)>,
     pub(super) running: Option<super::simulate::Running>,
@@ -159,6 +161,7 @@ impl<'a> Runner<'a> {
             turning: None,
             placed: None,
             control: None,
+            control_at: None,
             curves: None,
             colliders: None,
             running: None,
@@ -270,7 +273,7 @@ impl<'a> Runner<'a> {
     /// Steps of a stage that this run is about.
     fn selected(&self, stage: Stage) -> Vec<Step> {
         let wanted = |s: &&Step| match s.what {
-            What::Frame(_, f) => self.options.frames.as_ref().is_none_or(|o| o.contains(&f)),
+            What::Frame(_, f) | What::CombAt(f) => self.options.frames.as_ref().is_none_or(|o| o.contains(&f)),
             What::Shadow(l, f) => {
                 let written = self.options.without != Some(Stage::Export);
                 let used = written && is_shadowed(self.project, l as usize, f, true);
@@ -518,11 +521,15 @@ impl<'a> Runner<'a> {
     }
 
     fn make(&mut self, what: What) -> Result<(), Error> {
-        use super::{areas, clumps, curves, export, groom, instance, interpolate, kept, preview, shadow, simulate};
+        use super::{
+            areas, clumps, comb, curves, export, groom, guides, instance, interpolate, kept, preview, shadow, simulate,
+        };
         match what {
             What::Curves => curves::hair(self).map(drop),
             What::Place => groom::placed(self).map(drop),
-            What::Comb => groom::combed(self).map(drop),
+            What::Panels(i) => guides::panels(self, i as usize).map(drop),
+            What::Comb => comb::combed(self).map(drop),
+            What::CombAt(frame) => comb::combed_at(self, frame).map(drop),
             What::Candidates(i) => instance::candidates(self, i).map(drop),
             What::Roots(i) => instance::grown(self, i).map(drop),
             What::Kept(i) => kept::kept_hairs(self, i).map(drop),

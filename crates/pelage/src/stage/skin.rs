@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::config::{Channel as ConfigChannel, MapRef, WrapMode};
 use crate::format::image::{self, Channel};
-use crate::format::ply;
+use crate::format::{nurbs, ply};
 use crate::project::{InputFile, Project, SkinAt};
 use pelage_geom::{Bvh, Mesh, Pose, SurfacePoint, TiledMap, Topology, Vec3, Wrap};
 use std::cell::OnceCell;
@@ -34,7 +34,8 @@ impl Skin {
     }
 
     fn from_file(file: &InputFile) -> Result<Self, Error> {
-        let read = ply::read_mesh(&file.path)?;
+        let patches = nurbs::is_nurbs(&file.path);
+        let read = if patches { nurbs::read_mesh(&file.path)? } else { ply::read_mesh(&file.path)? };
         let mesh = read.mesh;
         if mesh.corner_uv.is_empty() {
             let what = format!("{}: the skin has no texture coordinates", file.label);
@@ -102,6 +103,9 @@ impl Skin {
         let position = match at {
             SkinAt::Rest => return Ok(self.rest.clone()),
             SkinAt::Rigid(t) => self.mesh.position.iter().map(|p| t.apply(Vec3::from(*p)).into()).collect(),
+            SkinAt::File(file) if nurbs::is_nurbs(&file.path) => {
+                nurbs::read_frame(&file.path, self.mesh.position.len())?
+            }
             SkinAt::File(file) => ply::read_frame(&file.path, self.mesh.position.len(), self.faces)?,
         };
         Ok(Pose::new(&self.mesh, &self.topology, position))

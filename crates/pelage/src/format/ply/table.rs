@@ -68,6 +68,11 @@ impl Table {
         if let Some(Column::F32(v)) = self.column(name) { Some(v) } else { None }
     }
 
+    /// Values of an `F64` column.
+    pub fn f64(&self, name: &str) -> Option<&[f64]> {
+        if let Some(Column::F64(v)) = self.column(name) { Some(v) } else { None }
+    }
+
     /// Values of a `U32` column.
     pub fn u32(&self, name: &str) -> Option<&[u32]> {
         if let Some(Column::U32(v)) = self.column(name) { Some(v) } else { None }

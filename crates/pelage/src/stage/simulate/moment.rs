@@ -3,7 +3,7 @@
 use super::super::body::{self, Colliders};
 use super::super::plan_kept::hairs_of;
 use super::super::run::Runner;
-use super::super::{Skin, What, curves, groom, instance, interpolate};
+use super::super::{Skin, What, comb, curves, groom, instance, interpolate};
 use crate::Error;
 use crate::config::Target;
 use crate::format::ply;
@@ -80,7 +80,7 @@ pub(super) fn source(run: &mut Runner<'_>, i: usize) -> Result<Source, Error> {
             whole: Whole::of(run, i)?,
         });
     }
-    let controls = groom::combed(run)?;
+    let controls = comb::combed(run)?;
     let on = control::Skin { mesh: &skin.mesh, topology: &skin.topology, rest: &skin.rest };
     let hair = |h: usize| {
         let frame = on.frame(&controls.root[h]);
