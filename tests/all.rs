@@ -14,6 +14,7 @@ mod pictures_page;
 mod reference;
 mod rows;
 mod samples;
+mod shape;
 mod simulate;
 mod skips;
 mod watch;

@@ -35,7 +35,10 @@ const SECTIONS: [(&str, &str, &str); 19] = [
 ];
 
 /// Tables of a groom file that are not shown: where hair stands, what it is made of, where a map is, and what styles are made of.
-const ELSEWHERE: [&str; 14] = [
+const ELSEWHERE: [&str; 17] = [
+    "Scalp",
+    "Cluster",
+    "JointTurn",
     "Control",
     "Placement",
     "Parting",

@@ -6,7 +6,7 @@ use pelage::format::image::{Channel, read_map};
 use pelage::format::ply;
 use pelage::progress::Progress;
 use pelage::project::Project;
-use pelage::stage::{Options, Runner, Skin, What, groom, instance};
+use pelage::stage::{Options, Runner, Skin, What, comb, groom, instance};
 use pelage::{curves, sample};
 use pelage_geom::{Bvh, Mesh, NONE, SurfacePoint, Topology, Vec3};
 use pelage_groom::control::{self, ControlHairs};
@@ -116,7 +116,7 @@ fn the_laws_of_the_coat_hold_on_the_bust() {
     let mut progress = Progress::new(true);
     let mut run = Runner::new(&project, Options::default(), &mut progress).unwrap_or_else(|e| panic!("{e}"));
     let skin = groom::skin(&mut run).unwrap_or_else(|e| panic!("{e}"));
-    let control = groom::combed(&mut run).unwrap_or_else(|e| panic!("{e}"));
+    let control = comb::combed(&mut run).unwrap_or_else(|e| panic!("{e}"));
     no_control_hair_enters(&skin, &control, 0.1);
     let sites = groom::placed(&mut run).unwrap_or_else(|e| panic!("{e}"));
     let triangulation = triangulate(&sites, &mirrored_charts(&skin.mesh, &skin.topology));
@@ -150,7 +150,7 @@ fn no_control_hair_enters_the_fox() {
     let mut progress = Progress::new(true);
     let mut run = Runner::new(&project, Options::default(), &mut progress).unwrap_or_else(|e| panic!("{e}"));
     let skin = groom::skin(&mut run).unwrap_or_else(|e| panic!("{e}"));
-    let control = groom::combed(&mut run).unwrap_or_else(|e| panic!("{e}"));
+    let control = comb::combed(&mut run).unwrap_or_else(|e| panic!("{e}"));
     no_control_hair_enters(&skin, &control, 0.1);
 }
 

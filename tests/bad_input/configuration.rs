@@ -384,3 +384,63 @@ fn fields_flows_and_cuts() {
     }
     corpus.finish();
 }
+
+#[test]
+fn clusters_chains_and_hairs_by_hand() {
+    let mut corpus = Corpus::new();
+    let cluster = "[[cluster]]\nname = \"a\"\nroot = [0.0, 5.0, 0.0]\nradius = 2.0\npoints = [[0.0, 9.0, 0.0]]\n";
+    let edit = |edit: &str| format!("{cluster}[[cluster_edit]]\n{edit}\n");
+    let hair = "[[control.hair]]\nname = \"w\"\nroot = [0.0, 5.0, 0.0]\n";
+    for (text, words) in [
+        (cluster.replace("radius = 2.0\n", ""), "cluster[0]|one of `radius`, `outline`"),
+        (cluster.replace("2.0", "-2.0"), "cluster[0].radius|out of range"),
+        (cluster.replace("[[0.0, 9.0, 0.0]]", "[]"), "cluster[0].points|one or more"),
+        (cluster.replace("[[0.0, 9.0, 0.0]]", "[[0.0, 5.0, 0.0]]"), "cluster[0]|control points"),
+        (cluster.replace("radius = 2.0", "outline = [[0.0, 5.0, 0.0], [0.0, 5.0, 0.1]]"), "outline|three corners"),
+        (cluster.replace("radius = 2.0", "radius = 2.0\nwidth = [0.0, 0.0]"), "cluster[0].width|above 0"),
+        (format!("{cluster}{cluster}"), "cluster[1].name|used twice"),
+        (edit("kind = \"split\"\nof = \"a\""), "cluster_edit[0]|needs `count`"),
+        (edit("kind = \"split\"\nof = \"b\"\ncount = 3"), "cluster_edit[0].of|no cluster `b`"),
+        (edit("kind = \"split\"\nof = \"a/0\"\ncount = 3"), "cluster_edit[0]|no cluster `a/0`"),
+        (edit("kind = \"braid\"\nof = \"a\"\ncount = 4\nturns = 1.0"), "cluster_edit[0].count|no such braid"),
+        (edit("kind = \"braid\"\nof = \"a\""), "cluster_edit[0]|needs `turns`"),
+        (edit("kind = \"copy\"\nof = \"a\""), "cluster_edit[0]|needs `to`"),
+        (edit("kind = \"twist\"\nof = \"a\"\nturns = 1.0\nwidth = [1.0]"), "cluster_edit[0].width|not read"),
+        ("[[comb]]\nkind = \"cluster\"\n".to_owned(), "comb[1]|there are no clusters"),
+        ("[scalp]\nup = [0.0, 1.0, 0.0]\n".to_owned(), "scalp|give `centre`, `up` and `front`"),
+        ("[scalp]\ngrowth = [[[0.0, 0.0], [1.0, 0.0]]]\n".to_owned(), "scalp.growth[0]|three or more"),
+        (
+            "[scalp]\ncentre = [0.0, 0.0, 0.0]\nup = [0.0, 1.0, 0.0]\nfront = [0.0, 2.0, 0.0]\n".to_owned(),
+            "scalp.front|not along",
+        ),
+        ("[[comb]]\nkind = \"chain\"\nat = [0.0, 5.0, 0.0]\n".to_owned(), "comb[1]|`turn` or `reach`"),
+        ("[[comb]]\nkind = \"chain\"\nhair = \"w\"\nreach = [0.0, 5.0, 0.0]\n".to_owned(), "comb[1].hair|no hair `w`"),
+        ("[[comb]]\nkind = \"mirror\"\n".to_owned(), "comb[1]|needs `plane`"),
+        (
+            "[[comb]]\nkind = \"mirror\"\nplane = { point = [0, 0, 0], normal = [0, 0, 0] }\n".to_owned(),
+            "comb[1].plane|direction",
+        ),
+        ("[[comb]]\nkind = \"trim\"\nfile = \"none.ply\"\n".to_owned(), "comb[1].file|none.ply"),
+        ("[[comb]]\nkind = \"bend\"\nangle = []\n".to_owned(), "angle"),
+        (
+            "[[comb]]\nkind = \"bend\"\nangle = [{ frame = 2, value = 1.0 }, { frame = 1, value = 0.0 }]\n".to_owned(),
+            "comb[1].angle|not in order",
+        ),
+        ("[[comb]]\nkind = \"bend\"\nangle = { value = 1.0, map = \"none.png\" }\n".to_owned(), "angle.map|none.png"),
+        ("[[comb]]\nkind = \"bend\"\nangle = 1.0\nhairs = [\"x*\"]\n".to_owned(), "comb[1].hairs|no hair `x*`"),
+        (format!("{hair}{hair}"), "control.hair[1].name|used twice"),
+        (format!("{hair}points = [[0.0, 5.0, 0.0]]\n"), "control.hair[0].points|apart"),
+        ("[[control.line]]\npoints = [[0.0, 5.0, 0.0], [5.0, 0.0, 0.0]]\ncount = 0\n".to_owned(), "count|out of range"),
+        ("[[layer]]\nname = \"x\"\nlength = { value = 1.0 }\n".to_owned(), "layer[0]|needs `density`"),
+        ("[[layer]]\nname = \"x\"\nhairs = [\"w\"]\n".to_owned(), "layer[0].hairs|no hair `w`"),
+        (format!("{hair}[[layer]]\nname = \"x\"\nhairs = [\"w\"]\ndensity = {{ value = 1.0 }}\n"), "density|not read"),
+        (
+            "[[layer]]\nname = \"x\"\nin_clusters = true\ndensity = { value = 1.0 }\nlength = { value = 1.0 }\n"
+                .to_owned(),
+            "in_clusters|no clusters",
+        ),
+    ] {
+        corpus.refuse_edit(GROOM, "[[layer]]", &format!("{text}\n[[layer]]"), &format!("ball.toml|{words}"));
+    }
+    corpus.finish();
+}

@@ -66,8 +66,8 @@ pub struct CombOp<'a> {
     pub only: Option<&'a [u32]>,
 }
 
-/// Lines from the roots of all hairs, each as long as its hair and of as many points, scene space: a field that is traced, a
-/// cylinder that roots lie in.
+/// Lines from the roots of all hairs, of as many points as these, scene space: a field that is traced, a
+/// cylinder that roots lie in. Their directions count, not their lengths.
 #[derive(Clone, Copy)]
 pub struct Guides<'a>(pub &'a (dyn Fn(&[Start]) -> Lines + Sync));
 

@@ -452,7 +452,11 @@ fn named_maps(groom: &GroomFile) -> Vec<(String, PathBuf)> {
     let mut out = Vec::new();
     let mut add = |key: String, map: Option<&PathBuf>| out.extend(map.map(|m| (key, m.clone())));
     add("control.length.map".into(), groom.control.length.as_ref().and_then(|f| f.map.as_ref()));
+    add("scalp.coordinates.map".into(), groom.scalp.coordinates.as_ref().map(|m| &m.map));
     for (i, c) in groom.comb.iter().enumerate() {
+        for (key, v) in c.varied() {
+            add(format!("comb[{i}].{key}.map"), v.0.map.as_ref());
+        }
         add(format!("comb[{i}].region.map"), c.region.as_ref().map(|m| &m.map));
         add(format!("comb[{i}].map.map"), c.map.as_ref().map(|m| &m.map));
         let through = c.panels.as_ref().and_then(|p| p.through.map.as_ref());

@@ -31,7 +31,7 @@ fn a_file_lies_on_top_of_what_it_includes() {
     assert_eq!(groom.control.placement.per_cm2, Some(1.0));
     // Operations go on, layers of one name are one.
     assert_eq!(groom.comb.len(), 2);
-    assert_eq!(groom.comb[1].angle, Some(3.0));
+    assert_eq!(groom.comb[1].angle.as_ref().map(|v| v.at(0.0)), Some(3.0));
     let layers: Vec<_> = groom.layer.iter().map(|l| (l.name.as_str(), l.length.value, l.width.value)).collect();
     assert_eq!(layers, [("a", 5.0, 70.0), ("b", 9.0, 90.0)]);
     // Paths are relative to the file that names them.

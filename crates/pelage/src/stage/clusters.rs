@@ -257,14 +257,14 @@ pub(super) fn middles(tree: &Tree, of: &[u32], uv: &[[f64; 2]]) -> Vec<u32> {
     best.into_iter().map(|b| b.1).collect()
 }
 
-/// Lines of `points` points and their lengths through the clusters that roots are in, root first, scene units. Roots without
-/// a cluster get lines without length.
+/// Lines of `points` points at equal chords through the clusters that roots are in, root first, scene units: to their ends, or
+/// no longer than `length` where it is given. Roots without a cluster get lines without length.
 pub(super) fn lines(
     tree: &Tree,
     of: &[u32],
     uv: &[[f64; 2]],
     root: &[Vec3],
-    length: &[f64],
+    length: Option<&[f64]>,
     points: usize,
     start: f64,
 ) -> Result<Lines, String> {
@@ -273,7 +273,10 @@ pub(super) fn lines(
     let ((own, uv), at): ((Vec<u32>, Vec<[f64; 2]>), Vec<Vec3>) =
         within.iter().map(pick).map(|(k, uv, at)| ((k, uv), at)).unzip();
     let rooted: Vec<Rooted> = attach(tree, &own, &uv, &at)?;
-    let cut: Vec<Length> = within.iter().map(|h| Length::Cut(length[*h].max(f64::MIN_POSITIVE))).collect();
+    let cut: Vec<Length> = match length {
+        Some(length) => within.iter().map(|h| Length::Cut(length[*h].max(f64::MIN_POSITIVE))).collect(),
+        None => vec![Length::Natural],
+    };
     let grown = if within.is_empty() { Vec::new() } else { grow(tree, &rooted, &cut, points, start)? };
     let mut out: Vec<Vec3> = root.iter().flat_map(|r| std::iter::repeat_n(*r, points)).collect();
     for (h, line) in within.iter().zip(grown.chunks_exact(points)) {

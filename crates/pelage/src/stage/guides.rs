@@ -36,7 +36,7 @@ const START: f64 = 0.15;
 pub(super) enum Guides {
     Field(GuideField),
     Flow(Flow),
-    /// Lines through clusters from all roots, by their lengths.
+    /// Lines through clusters from all roots.
     Clusters(InClusters),
 }
 
@@ -79,8 +79,9 @@ impl Guides {
         match self {
             Guides::Field(field) => field.trace(starts, &settings, Some(guard)),
             Guides::Clusters(c) => {
-                let (root, length): (Vec<Vec3>, Vec<f64>) = starts.iter().map(|s| (s.at, s.length)).unzip();
-                clusters::lines(&c.tree, &c.of, &c.uv, &root, &length, points, START).expect("the tree was checked")
+                // A control hair stands for hair of any length: it takes the shape of the whole cluster.
+                let root: Vec<Vec3> = starts.iter().map(|s| s.at).collect();
+                clusters::lines(&c.tree, &c.of, &c.uv, &root, None, points, START).expect("the tree was checked")
             }
             Guides::Flow(f) => f.lines(&Trace { reverse: f.reverse, ..settings }, guard, starts, longest),
         }

@@ -260,7 +260,7 @@ fn in_clusters(
     let at: Vec<Vec3> = roots.root.iter().map(|p| skin.mesh.point(p)).collect();
     let length: Vec<f64> = rest.chunks_exact(points).map(curve::length).collect();
     let wrong = |e: String| run.project.groom.error(&format!("layer[{i}].cluster"), e, "");
-    let lines = clusters::lines(&tree, &of, &uv, &at, &length, points, layer.start).map_err(wrong)?;
+    let lines = clusters::lines(&tree, &of, &uv, &at, Some(&length), points, layer.start).map_err(wrong)?;
     let mut hair: Vec<u32> = (0..of.len() as u32).filter(|h| of[*h as usize] != NONE).collect();
     // Hairs of one carrier side by side.
     hair.sort_by_key(|h| (top[*h as usize], *h));
