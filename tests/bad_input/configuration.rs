@@ -389,13 +389,14 @@ fn fields_flows_and_cuts() {
 fn clusters_chains_and_hairs_by_hand() {
     let mut corpus = Corpus::new();
     let cluster = "[[cluster]]\nname = \"a\"\nroot = [0.0, 5.0, 0.0]\nradius = 2.0\npoints = [[0.0, 9.0, 0.0]]\n";
-    let edit = |edit: &str| format!("{cluster}[[cluster_edit]]\n{edit}\n");
+    let used = "[[comb]]\nkind = \"cluster\"\n";
+    let edit = |edit: &str| format!("{cluster}[[cluster_edit]]\n{edit}\n{used}");
     let hair = "[[control.hair]]\nname = \"w\"\nroot = [0.0, 5.0, 0.0]\n";
     for (text, words) in [
         (cluster.replace("radius = 2.0\n", ""), "cluster[0]|one of `radius`, `outline`"),
         (cluster.replace("2.0", "-2.0"), "cluster[0].radius|out of range"),
         (cluster.replace("[[0.0, 9.0, 0.0]]", "[]"), "cluster[0].points|one or more"),
-        (cluster.replace("[[0.0, 9.0, 0.0]]", "[[0.0, 5.0, 0.0]]"), "cluster[0]|control points"),
+        (cluster.replace("0.0]]", "0.0], [0.0, 9.0, 0.0]]") + used, "cluster[0]|control points 1 and 2"),
         (cluster.replace("radius = 2.0", "outline = [[0.0, 5.0, 0.0], [0.0, 5.0, 0.1]]"), "outline|three corners"),
         (cluster.replace("radius = 2.0", "radius = 2.0\nwidth = [0.0, 0.0]"), "cluster[0].width|above 0"),
         (format!("{cluster}{cluster}"), "cluster[1].name|used twice"),

@@ -4,16 +4,16 @@ use super::UpAxis;
 use super::document::exactly;
 use pelage_geom::motion::between;
 use schemars::JsonSchema;
-use serde::Deserialize;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{DeserializeOwned, Deserializer, Error as _, IntoDeserializer, MapAccess, SeqAccess, Visitor};
-use serde::ser::{Serialize, Serializer};
+use serde::ser::Serializer;
+use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::fmt;
 use std::marker::PhantomData;
 
 /// Three numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(transparent)]
 pub struct Vector(#[serde(deserialize_with = "exactly")] pub [f64; 3]);
 
@@ -39,7 +39,7 @@ pub enum Amount {
 pub struct Keyed<T>(pub Vec<Key<T>>);
 
 /// A key frame.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Key<T> {
     /// Frame number, may lie between frames.
@@ -71,10 +71,13 @@ impl<T: fmt::Display> fmt::Display for Keyed<T> {
     }
 }
 
-/// As text.
-impl<T: fmt::Display> Serialize for Keyed<T> {
+/// The value, or the list of keys.
+impl<T: Serialize> Serialize for Keyed<T> {
     fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
-        s.collect_str(self)
+        match &self.0[..] {
+            [only] => only.value.serialize(s),
+            keys => keys.serialize(s),
+        }
     }
 }
 

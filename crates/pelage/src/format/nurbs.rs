@@ -38,7 +38,7 @@ struct PatchFile {
     v: Option<Vec<f64>>,
     /// Cells that it is cut into along u and v. Default: four for each piece between knots.
     cells: Option<[usize; 2]>,
-    /// True if its front is where u runs to the left of v.
+    /// True if v runs to the right of u as seen from its front; to the left if not.
     #[serde(default)]
     flip: bool,
 }

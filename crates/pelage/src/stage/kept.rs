@@ -1,12 +1,13 @@
 //! Kept: of the hairs that a layer has, those that the shot needs (`[skip]`), once for all frames.
 
-use super::plan_look::acting_clumps;
+use super::plan_look::{Effect, acting_clumps, effects};
 use super::run::{Counts, Runner};
 use super::skin::{Texel, read_map};
 use super::tables::{decode, encode, table};
 use super::{What, clumps, groom, instance, layer_seed, preview};
 use crate::Error;
 use crate::format::ply::Column;
+use crate::project::Project;
 use pelage_geom::Vec3;
 use pelage_groom::instance::Roots;
 use pelage_groom::interpolate::root_positions;
@@ -164,6 +165,13 @@ fn seen(run: &mut Runner<'_>, i: usize, all: &Roots, margin: f64) -> Result<Vec<
 
 /// Keeps the centres that hairs which are kept are drawn to, level after level: whatever is in a clump of a finer level goes
 /// where the centre of that goes.
+/// True if the centres of clumps are found among all hairs of their region or cluster.
+fn needs_all(project: &Project, i: usize) -> bool {
+    let layer = &project.groom.value.layer[i];
+    let found = |k: usize| layer.clump[k].regions.is_some() || layer.clump[k].clusters.is_some();
+    effects(project, i).concat().contains(&Effect::Cluster) || acting_clumps(project, i).into_iter().any(found)
+}
+
 fn add_centres(
     run: &mut Runner<'_>,
     i: usize,
@@ -173,16 +181,12 @@ fn add_centres(
 ) -> Result<(), Error> {
     let layer = &run.project.groom.value.layer[i];
     let hairs = Drawn { id: &all.id, uv: &all.uv, position, seed: u64::from(layer_seed(&layer.name)) };
+    if needs_all(run.project, i) {
+        run.warn_once(format!("layer {}: its clusters or regions need all hairs: [skip] leaves none out", layer.name));
+        keep.fill(true);
+        return Ok(());
+    }
     for k in acting_clumps(run.project, i) {
-        if layer.clump[k].regions.is_some() {
-            // The centre of a region is found among all of its hairs.
-            run.warn_once(format!(
-                "layer {}: its clumps by regions need all hairs: [skip] leaves none out",
-                layer.name
-            ));
-            keep.fill(true);
-            return Ok(());
-        }
         let centre = clumps::centre_hairs(run, i, k, &hairs, &[])?;
         let reach = clumps::sizes(run, i, k, &hairs)?.most();
         let near = around(position, keep, reach);
