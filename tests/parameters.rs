@@ -563,6 +563,7 @@ pub const WITHOUT: &[(&str, &str)] = &[
     ("comb.reach", "goes with a single hair"),
     ("comb.plane", "what is mirrored where"),
     ("comb.file", "as a cut"),
+    ("comb.key", "as a cut"),
     ("comb.level", "shown in the styles of the gallery"),
     ("clump.clusters", "shown in the styles of the gallery"),
 ];

@@ -418,6 +418,10 @@ fn clusters_chains_and_hairs_by_hand() {
         ("[[comb]]\nkind = \"chain\"\nhair = \"w\"\nreach = [0.0, 5.0, 0.0]\n".to_owned(), "comb[1].hair|no hair `w`"),
         ("[[comb]]\nkind = \"mirror\"\n".to_owned(), "comb[1]|needs `plane`"),
         (
+            "[[comb]]\nkind = \"cut\"\nkey = [{ at = [0, 5, 0], length = 1 }]\n".to_owned(),
+            "comb[1].key|goes with `scalp`",
+        ),
+        (
             "[[comb]]\nkind = \"mirror\"\nplane = { point = [0, 0, 0], normal = [0, 0, 0] }\n".to_owned(),
             "comb[1].plane|direction",
         ),

@@ -36,7 +36,7 @@ fn main() {
     let uv: Vec<[f64; 2]> = region.fill(HAIRS).into_iter().map(|p| region.at(p)).collect();
     let root: Vec<Vec3> = uv.iter().map(|[u, v]| Vec3::new(20.0 * u, 20.0 * v, 0.0)).collect();
     let owners = timed("owners of 100,000 hairs", || Owners::find(&tree, &uv));
-    let hairs = attach(&tree, &owners, &uv, &root).expect("attached");
+    let hairs = attach(&tree, &owners.last(), &uv, &root).expect("attached");
     let hairs: Vec<_> = hairs.into_iter().filter(|h| h.cluster != NONE).collect();
     let natural = timed("hairs of 32 points", || grow(&tree, &hairs, &[Length::Natural], POINTS, 0.5).expect("hairs"));
     println!("{} hairs", natural.len() / POINTS);

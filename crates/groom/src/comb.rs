@@ -14,7 +14,7 @@ mod chain;
 mod mirror;
 
 use crate::control::{ControlHairs, Skin, to_local, to_world, vec3};
-use crate::field::lengths::{Shear, Sphere};
+use crate::field::lengths::{Shear, Sphere, between_keys};
 use crate::flow::trace::{Lines, Start};
 use crate::flow::trim::{cut, length_to};
 use pelage_geom::curve::{closest_on_polyline, length as polyline_length};
@@ -138,6 +138,13 @@ pub enum CombKind<'a> {
         shear: &'a Shear,
         /// Hair is as long as the way around this sphere to its plane; without, it is cut where it meets the plane.
         scalp: Option<Sphere>,
+    },
+    /// Cuts hairs to lengths between those at key places ("sparse guide hairs", §2.1; [`between_keys`]); weights as for a cut.
+    Keys {
+        /// Middle of the scalp, scene space.
+        centre: Vec3,
+        /// Places and lengths there, scene units.
+        key: Vec<(Vec3, f64)>,
     },
     /// Cuts hairs where they first run through a surface ("streamlines of flow" in the same course notes, §3); weights as for a cut.
     Trim {
@@ -395,12 +402,13 @@ fn apply(kind: &CombKind, given: &Given, weight: f64, hair: Hair<'_>) -> CombCou
             });
             combed
         }
-        CombKind::Cut { .. } | CombKind::Trim { .. } => {
+        CombKind::Cut { .. } | CombKind::Keys { .. } | CombKind::Trim { .. } => {
             let line = world_points(frame, local);
             let length: f64 = line.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
             let asked = match kind {
                 CombKind::Cut { shear, scalp: Some(scalp) } => Some(shear.length(scalp, frame.origin)),
                 CombKind::Cut { shear, scalp: None } => shear.length_along(&line),
+                CombKind::Keys { centre, key } => Some(between_keys(*centre, key, frame.origin)),
                 CombKind::Trim { surface } => length_to(&line, surface),
                 _ => None,
             };

@@ -308,3 +308,19 @@ fn hair_is_trimmed_where_it_runs_through_a_surface() {
         assert_eq!((hairs.hair(h), hairs.cut[h]), (before.hair(h), f32::INFINITY));
     }
 }
+
+#[test]
+fn hair_is_cut_to_lengths_between_keys() {
+    let (s, before) = groomed();
+    let at = |h: usize| s.skin().frame(&before.root[h]).origin;
+    let centre = at(0) - Vec3::y() * 9.0;
+    let key = vec![(at(0), 1.5), (at(20), 0.75), (at(9), 40.0)];
+    let mut hairs = before.clone();
+    comb(&s.skin(), &[], &[op(CombKind::Keys { centre, key: key.clone() })], &mut hairs);
+    assert!((hairs.length(0) - 1.5).abs() < 1e-5 && (hairs.length(20) - 0.75).abs() < 1e-5);
+    assert_eq!(hairs.length(9), before.length(9), "hair is not made longer");
+    for h in 0..hairs.len() {
+        let asked = between_keys(centre, &key, at(h)).min(before.length(h));
+        assert!((hairs.length(h) - asked).abs() < 1e-5);
+    }
+}

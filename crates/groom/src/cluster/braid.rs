@@ -46,7 +46,7 @@ pub fn braid(tree: &mut Tree, cluster: u32, braid: &Braid) -> Result<Vec<u32>, S
     if !(3..=9).contains(&n) || n.is_multiple_of(2) {
         return Err(format!("a braid has 3, 5, 7 or 9 strands, not {n}"));
     }
-    if !(turns.is_finite() && turns.abs() <= 1e3) || !(start > 0.0 && start < 1.0) {
+    if !(turns.abs() <= 1e3 && start > 0.0 && start < 1.0) {
         return Err(format!("a braid of {turns} turns that starts over {start} of its length"));
     }
     let parent = tree.of(cluster)?;

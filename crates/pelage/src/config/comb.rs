@@ -1,7 +1,7 @@
 //! Combing: one operation after another on control hairs.
 
 use super::GroomFile;
-use super::document::{ConfigError, Document, some_exactly};
+use super::document::{ConfigError, Document, exactly, some_exactly};
 use super::groom::{MapRef, is_named, some_points};
 use super::guides::{Ball, Element, Panels, Plane, Primitive, Region, Shear};
 use super::keyed::{Keyed, Vector};
@@ -81,6 +81,9 @@ pub struct Comb {
     pub file: Option<PathBuf>,
     /// cut: where.
     pub shear: Option<Shear>,
+    /// cut: lengths at places of the scalp; hair in between is cut to a length in between.
+    #[serde(default)]
+    pub key: Vec<KeyLength>,
     /// cut: hair gets the length of the shortest way around this ball to its plane. Default: it is cut where it meets the plane.
     pub scalp: Option<Ball>,
 }
@@ -95,6 +98,17 @@ fn whole() -> LookValue {
 
 fn none() -> LookValue {
     LookValue::constant(0.0)
+}
+
+/// A length of hair at a place.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct KeyLength {
+    /// The place, on or near the skin, scene units.
+    #[serde(deserialize_with = "exactly")]
+    pub at: [f64; 3],
+    /// The length there, scene units.
+    pub length: f64,
 }
 
 /// A turn of a chain at one of its joints.
@@ -229,9 +243,10 @@ impl Document<GroomFile> {
             Chain | Cluster => "",
             Mirror => "plane",
             Trim => "file",
-            Cut => "shear",
+            Cut if c.key.is_empty() => "shear",
+            Cut => "key",
         };
-        let given: [(&str, bool, &[CombKind]); 25] = [
+        let given: [(&str, bool, &[CombKind]); 26] = [
             ("points", c.points.is_some(), &[DirectionCurve]),
             ("radius", c.radius.is_some(), &[DirectionCurve, Chain]),
             ("falloff", c.falloff.is_some(), &[DirectionCurve, Chain]),
@@ -256,6 +271,7 @@ impl Document<GroomFile> {
             ("reverse", c.reverse, &[Flow]),
             ("level", c.level.is_some(), &[Cluster]),
             ("shear", c.shear.is_some(), &[Cut]),
+            ("key", !c.key.is_empty(), &[Cut]),
             ("scalp", c.scalp.is_some(), &[Cut]),
         ];
         let read = |(name, has, kinds): (_, bool, &[CombKind])| {
@@ -294,10 +310,16 @@ impl Document<GroomFile> {
             .iter()
             .enumerate()
             .try_for_each(|(i, t)| self.keyed(&format!("{key}.turn[{i}].turn"), &t.turn, finite))?;
-        if let Some(names) = &c.hairs {
-            for n in names.iter().filter(|n| !self.has_hair(n)) {
-                return Err(self.error(&format!("{key}.hairs"), format!("there is no hair `{n}`"), NO_HAIR));
-            }
+        if let Some(n) = c.hairs.iter().flatten().find(|n| !self.has_hair(n)) {
+            return Err(self.error(&format!("{key}.hairs"), format!("there is no hair `{n}`"), NO_HAIR));
+        }
+        for (i, k) in c.key.iter().enumerate() {
+            k.at.into_iter().try_for_each(|x| self.within(&format!("{key}.key[{i}].at"), x, -1e9, 1e9))?;
+            self.within(&format!("{key}.key[{i}].length"), k.length, 0.0, 1e6)?;
+        }
+        if !c.key.is_empty() && (c.shear.is_some() || c.scalp.is_none()) {
+            let help = "a cut has a `shear`, or a `key` with the `scalp` that it lies on";
+            return Err(self.error(&format!("{key}.key"), "goes with `scalp`, and not with `shear`", help));
         }
         if c.kind == Chain {
             if c.hair.is_some() == c.at.is_some() || c.turn.is_empty() && c.reach.is_none() {

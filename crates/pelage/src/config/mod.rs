@@ -17,7 +17,7 @@ mod simulate;
 mod skip;
 
 pub use cluster::{Cluster, ClusterEdit, ClusterEditKind, ClusterLook, MOST_CLUSTERS, Scalp};
-pub use comb::{Comb, CombKind, JointTurn, Side, Space};
+pub use comb::{Comb, CombKind, JointTurn, KeyLength, Side, Space};
 pub use document::{ConfigError, Document};
 pub use groom::{
     Channel, ColorFeature, Control, ControlHair, ControlLine, Feature, GroomFile, Guard, GuideChoice, Layer,

@@ -269,9 +269,9 @@ pub(super) fn lines(
     start: f64,
 ) -> Result<Lines, String> {
     let within: Vec<usize> = (0..of.len()).filter(|h| of[*h] != NONE).collect();
-    let pick = |h: &usize| (of[*h], uv[*h], root[*h]);
-    let ((own, uv), at): ((Vec<u32>, Vec<[f64; 2]>), Vec<Vec3>) =
-        within.iter().map(pick).map(|(k, uv, at)| ((k, uv), at)).unzip();
+    let own: Vec<u32> = within.iter().map(|h| of[*h]).collect();
+    let uv: Vec<[f64; 2]> = within.iter().map(|h| uv[*h]).collect();
+    let at: Vec<Vec3> = within.iter().map(|h| root[*h]).collect();
     let rooted: Vec<Rooted> = attach(tree, &own, &uv, &at)?;
     let cut: Vec<Length> = match length {
         Some(length) => within.iter().map(|h| Length::Cut(length[*h].max(f64::MIN_POSITIVE))).collect(),

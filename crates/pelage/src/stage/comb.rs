@@ -178,6 +178,10 @@ fn operation<'a>(run: &Runner<'_>, c: &Comb, read: &'a Read, guides: Option<Guid
         Kind::Field | Kind::Flow | Kind::Cluster => {
             CombKind::Follow { guides: guides.expect("made for these kinds"), bend, curvature }
         }
+        Kind::Cut if !c.key.is_empty() => CombKind::Keys {
+            centre: c.scalp.map_or(Vec3::zeros(), |b| b.centre.into()),
+            key: c.key.iter().map(|k| (Vec3::from(k.at), k.length)).collect(),
+        },
         Kind::Cut => CombKind::Cut {
             shear: read.shear.as_ref().expect("checked: a cut has its planes"),
             scalp: c.scalp.as_ref().map(guides::ball),

@@ -153,6 +153,7 @@ impl Reader<'_> {
             ("element", serde_json::to_value(&c.element)),
             ("shear", serde_json::to_value(&c.shear)),
             ("turn", serde_json::to_value(&c.turn)),
+            ("key", serde_json::to_value(&c.key)),
             ("plane", serde_json::to_value(c.plane)),
             ("scalp", serde_json::to_value(c.scalp)),
         ];
