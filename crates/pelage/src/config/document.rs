@@ -157,7 +157,7 @@ impl<T> Document<T> {
 
     /// The files that it was read from and their texts, the one that includes the others first.
     pub fn files(&self) -> impl Iterator<Item = (&Path, &str)> {
-        self.source.part.iter().map(|p| (p.path.as_path(), p.text()))
+        self.source.files()
     }
 
     /// The file that says a key, or would.

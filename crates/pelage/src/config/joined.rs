@@ -62,6 +62,13 @@ impl Source {
         out
     }
 
+    /// The files that a person writes, the one that includes the others first.
+    pub fn files(&self) -> impl Iterator<Item = (&Path, &str)> {
+        // The presets come last.
+        let own = self.part.len() - usize::from(self.joins);
+        self.part[..own].iter().map(|p| (p.path.as_path(), p.text()))
+    }
+
     /// A text with all that it includes, and the presets.
     pub fn joined(path: &Path, text: String) -> Result<Self, ConfigError> {
         let mut out = Source { joins: true, ..Source::plain(path, text) };
@@ -249,10 +256,7 @@ fn merge<'a>(under: &mut DeTable<'a>, over: DeTable<'a>) {
                     }
                 }
             }
-            (b, o) => {
-                *b = o;
-                *below = Spanned::new(span, std::mem::replace(below.get_mut(), DeValue::Boolean(false)));
-            }
+            (_, o) => *below = Spanned::new(span, o),
         }
     }
 }
