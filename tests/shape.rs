@@ -554,3 +554,26 @@ fn hairs_that_meet_are_told() {
     let out = shot.pelage(&["intersect", file, "--ellipsoid", "1,2,3"]);
     assert_eq!(out.status.code(), Some(2));
 }
+
+#[test]
+fn ways_of_placing_are_told_apart() {
+    let shot = groomed(
+        "[control]\nplacement = { grid = [4, 3] }\n[[layer]]\nname = \"coat\"\ndensity = { value = 0.5 }\nlength = { value = 1.0 }\n",
+    );
+    shot.report(&[]);
+    for (from, to, why) in [
+        ("[4, 3] }", "[4, 3], even = true }", "control.placement.even added"),
+        ("even = true }", "even = true, relax = 10 }", "control.placement.relax added"),
+        ("relax = 10 }", "relax = 20 }", "control.placement.relax 10 -> 20"),
+    ] {
+        let before = shot.entries();
+        shot.edit(GROOM, from, to);
+        let (run, reasons) = shot.plan(&[]);
+        assert!(run.contains("groom/place"), "{run:?}");
+        assert_eq!(reasons.iter().collect::<Vec<_>>(), [&format!("grooms/ball.toml: {why}")]);
+        shot.report(&[]);
+        assert!(shot.entries() != before);
+    }
+    shot.edit(GROOM, "grid = [4, 3], even = true, relax = 20", "even = true");
+    refused(&shot, &["control.placement", "[[control.hair]]"]);
+}
