@@ -93,7 +93,7 @@ fn the_gallery_is_valid() {
         let path = file.expect("a file").path();
         let groom = path.to_string_lossy().ends_with("-groom.toml");
         let checked = match groom {
-            true => Document::<GroomFile>::read(&path).and_then(|d| d.check()),
+            true => Document::<GroomFile>::read_joined(&path).and_then(|d| d.check()),
             false => Document::<ShotFile>::read(&path).and_then(|d| d.check()),
         };
         checked.unwrap_or_else(|e| panic!("{e}"));

@@ -436,7 +436,7 @@ fn clusters_chains_and_hairs_by_hand() {
         (format!("{hair}{hair}"), "control.hair[1].name|used twice"),
         (format!("{hair}points = [[0.0, 5.0, 0.0]]\n"), "control.hair[0].points|apart"),
         ("[[control.line]]\npoints = [[0.0, 5.0, 0.0], [5.0, 0.0, 0.0]]\ncount = 0\n".to_owned(), "count|out of range"),
-        ("[[layer]]\nname = \"x\"\nlength = { value = 1.0 }\n".to_owned(), "layer[0]|needs `density`"),
+        ("[[layer]]\nname = \"x\"\nlength = { value = 1.0 }\n".to_owned(), "layer[0]|needs `density`|help:"),
         ("[[layer]]\nname = \"x\"\nhairs = [\"w\"]\n".to_owned(), "layer[0].hairs|no hair `w`"),
         (format!("{hair}[[layer]]\nname = \"x\"\nhairs = [\"w\"]\ndensity = {{ value = 1.0 }}\n"), "density|not read"),
         (

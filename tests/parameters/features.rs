@@ -5,6 +5,9 @@ use super::{Shown, shown};
 
 const ALONG: &str = "kind = \"direction-curve\"\npoints = [[-10.0, 0.0, 0.0], [10.0, 0.0, 0.0]]";
 
+/// A cluster that twists in the middle, split in five.
+const CLUSTER: &str = "\n[[cluster]]\nname = \"tuft\"\nroot = [0.0, 0.0, 0.0]\nradius = 1.2\npoints = [[0.0, 0.8, 0.0], [0.2, 1.9, 0.0]]\nwidth = [1.2, 0.6, 0.4]\n\n[[cluster_edit]]\nkind = \"split\"\nof = \"tuft\"\ncount = 5\n\n[[cluster_edit]]\nkind = \"scale\"\nof = \"tuft/*\"\nwidth = [1.0, 0.5, 0.2]\n\n[[cluster_edit]]\nkind = \"twist\"\nof = \"tuft\"\nturns = 0.75";
+
 /// Parameters of a layer, its features and its combing.
 pub(super) const FEATURES: &[Shown] = &[
     // A layer and its features.
@@ -43,6 +46,19 @@ pub(super) const FEATURES: &[Shown] = &[
         Fur,
         "",
         ["color = { value = [0.02, 0.014, 0.01] }", "", "color = { value = [0.75, 0.55, 0.30] }"],
+    ),
+    shown(
+        "layer.guides",
+        Fur,
+        "\n[[comb]]\nkind = \"direction-map\"\nweight = 0.8\nmap = { map = \"maps/swirl.png\" }",
+        ["guides = \"blend\"", "guides = \"nearest\"", "guides = \"copy\""],
+    ),
+    shown("layer.cluster", Field, CLUSTER, ["", "[layer.cluster]\npercent = 0.6", "[layer.cluster]"]),
+    shown(
+        "layer.in_clusters",
+        Field,
+        CLUSTER,
+        ["in_clusters = false", "in_clusters = true", "in_clusters = true\nlength = { value = 0.8 }"],
     ),
     shown("layer.guard", Fur, "", ["", "guard = { percent = 0.05 }", "guard = { percent = 0.3 }"]),
     shown(
@@ -168,6 +184,38 @@ pub(super) const FEATURES: &[Shown] = &[
             "side = \"left\"",
             "side = \"right\"",
             "side = \"right\"\n[[comb]]\nkind = \"direction-curve\"\npoints = [[10.0, 0.0, 0.0], [-10.0, 0.0, 0.0]]\nbend = 0.5\nparting = \"middle\"\nside = \"left\"",
+        ],
+    ),
+    shown(
+        "comb.at",
+        Field,
+        "kind = \"chain\"\nradius = 1.2\nturn = [{ joint = 0, turn = [0.0, 0.0, -70.0] }]",
+        ["at = [-1.2, 0.0, 0.0]", "at = [0.0, 0.0, 0.5]", "at = [1.2, 0.0, 0.0]"],
+    ),
+    shown(
+        "comb.turn",
+        Field,
+        "kind = \"chain\"\nat = [0.0, 0.0, 0.0]\nradius = 1.5\nfalloff = 0.5",
+        [
+            "turn = [{ joint = 0, turn = [0.0, 0.0, -50.0] }]",
+            "turn = [{ joint = 2, turn = [0.0, 0.0, -90.0] }]",
+            "turn = [{ joint = 0, turn = [0.0, 0.0, 60.0] }, { joint = 2, turn = [0.0, 0.0, -120.0] }]",
+        ],
+    ),
+    shown(
+        "comb.reach",
+        Field,
+        "kind = \"chain\"\nat = [0.0, 0.0, 0.0]\nradius = 1.5",
+        ["reach = [-1.2, 0.6, 0.0]", "reach = [0.0, 0.6, 0.0]", "reach = [1.2, 0.9, 0.0]"],
+    ),
+    shown(
+        "comb.plane",
+        Field,
+        "kind = \"direction-curve\"\npoints = [[-10.0, 0.0, -4.0], [10.0, 0.0, 4.0]]\nbend = 0.7\n[[comb]]\nkind = \"mirror\"",
+        [
+            "plane = { point = [0.0, 0.0, 0.0], normal = [1.0, 0.0, 0.0] }",
+            "plane = { point = [0.0, 0.0, 0.0], normal = [-1.0, 0.0, 0.0] }",
+            "plane = { point = [0.0, 0.0, 0.0], normal = [0.0, 0.0, 1.0] }",
         ],
     ),
     shown(

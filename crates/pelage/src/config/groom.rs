@@ -405,9 +405,11 @@ pub struct Layer {
     pub order: Option<Vec<Operator>>,
 }
 
-/// Stands for a feature that is not given, until the layer is checked.
+/// Value that stands for one that is not given, until the layer is checked.
+const UNSAID: f64 = f64::MIN;
+
 fn unsaid() -> Feature {
-    constant(f64::NAN)
+    constant(UNSAID)
 }
 
 fn default_width() -> WidthFeature {
@@ -432,7 +434,7 @@ impl GroomFile {
     pub fn settle(&mut self) {
         for l in self.layer.iter_mut().filter(|l| !l.hairs.is_empty()) {
             l.density = constant(0.0);
-            if l.length.value.is_nan() {
+            if l.length.value == UNSAID {
                 l.length = constant(1.0);
             }
         }
@@ -531,15 +533,20 @@ impl Document<GroomFile> {
 
     fn check_layer(&self, key: &str, l: &Layer) -> Result<(), ConfigError> {
         let by_hand = !l.hairs.is_empty();
-        self.keys(
-            key,
-            &[("density", !l.density.value.is_nan(), !by_hand), ("length", by_hand || !l.length.value.is_nan(), true)],
-        )?;
+        let said = |f: &Feature| f.value != UNSAID;
+        if by_hand && said(&l.density) {
+            return Err(self.error(&format!("{key}.density"), "is not read beside `hairs`", "take one of the two out"));
+        }
+        for (name, f) in [("density", &l.density), ("length", &l.length)] {
+            if !by_hand && !said(f) {
+                return Err(self.error(key, format!("needs `{name}`"), "or `hairs`, for hairs placed one by one"));
+            }
+        }
         if let Some(n) = l.hairs.iter().find(|n| !self.has_hair(n)) {
             return Err(self.error(&format!("{key}.hairs"), format!("there is no hair `{n}`"), NO_HAIR));
         }
         if by_hand {
-            let length = if l.length.value.is_nan() { &constant(1.0) } else { &l.length };
+            let length = if l.length.value == UNSAID { &constant(1.0) } else { &l.length };
             self.feature(&format!("{key}.length"), length, 1e3)?;
         } else {
             self.feature(&format!("{key}.density"), &l.density, 1e5)?;
