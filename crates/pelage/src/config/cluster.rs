@@ -8,8 +8,11 @@ use super::look_value::LookValue;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Most clusters of a groom.
-pub const MOST_CLUSTERS: usize = 100_000;
+/// Most clusters of a groom: splitting takes 2 ms each, in every run that needs them.
+pub const MOST_CLUSTERS: usize = 5_000;
+
+/// Most parts of one step: relaxing them takes time as their square.
+const MOST_PARTS: usize = 100;
 
 /// Scalp space, a plane that roots have coordinates in: polar about a middle (`centre`, `up`, `front`), those of a map, or, if
 /// nothing is given, texture coordinates.
@@ -213,8 +216,9 @@ impl Document<GroomFile> {
                 ));
             }
         }
-        if e.count.is_some_and(|n| !(1..=1000).contains(&n)) {
-            return Err(self.error(&format!("{at}.count"), "is out of range", "1 to 1000"));
+        if e.count.is_some_and(|n| !(1..=MOST_PARTS).contains(&n)) {
+            let help = format!("1 to {MOST_PARTS}; split what was split for more");
+            return Err(self.error(&format!("{at}.count"), "is out of range", help));
         }
         if e.kind == Braid && e.count.is_some_and(|n| !matches!(n, 3 | 5 | 7 | 9)) {
             return Err(self.error(&format!("{at}.count"), "no such braid", "3, 5, 7 or 9 strands"));

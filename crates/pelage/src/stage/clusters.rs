@@ -83,10 +83,19 @@ pub(super) fn tree(run: &mut Runner<'_>) -> Result<Arc<Tree>, Error> {
     for (i, e) in groom.value.cluster_edit.iter().enumerate() {
         let wrong = |e: String| groom.error(&format!("cluster_edit[{i}]"), e, "");
         let of = find(&tree, &groom.value.cluster, &e.of).map_err(wrong)?;
-        apply(&mut tree, &groom.value.cluster, e, &of).map_err(wrong)?;
-        if tree.cluster.len() > MOST_CLUSTERS {
+        let more = match e.kind {
+            Kind::Split => of.len() * e.count.unwrap_or(1),
+            Kind::Braid => of.len() * e.count.unwrap_or(3),
+            Kind::Copy => {
+                let to = find(&tree, &groom.value.cluster, e.to.as_deref().unwrap_or_default()).map_err(wrong)?;
+                to.len() * tree.below(of[0]).len()
+            }
+            Kind::Twist | Kind::Scale | Kind::Move => 0,
+        };
+        if tree.cluster.len() + more > MOST_CLUSTERS {
             return Err(wrong(format!("makes more than {MOST_CLUSTERS} clusters")).into());
         }
+        apply(&mut tree, &groom.value.cluster, e, &of).map_err(wrong)?;
     }
     Ok(run.tree.insert(Arc::new(tree)).clone())
 }
