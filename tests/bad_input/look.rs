@@ -152,7 +152,7 @@ fn curls_waves_noise_wind_and_their_order() {
         ("[layer.wind]\namplitude = 1\nsize = 1\ndirection = [0, 0, 0]".to_owned(), "wind.direction|a direction|help:"),
         ("[layer.wind]\namplitude = 1\nsize = 0\ndirection = [1, 0, 0]".to_owned(), "wind.size|out of range"),
         ("[layer.wind]\namplitude = 1\nsize = 1\ngust = 2\ndirection = [1, 0, 0]".to_owned(), "wind.gust|out of range"),
-        ("order = [\"clump\", \"clump\"]".to_owned(), "order|every operator once|help:"),
+        ("order = [\"clump\", \"clump\"]".to_owned(), "order|every operator of the layer once|help:"),
         ("collision = { clearance = 0 }".to_owned(), "collision.clearance|out of range"),
         ("collision = { held = nan }".to_owned(), "collision.held|out of range"),
         (curl("simulate = true\n[[layer.clump]]\ndensity = 1"), "is simulated comes after one that is not|help:"),
