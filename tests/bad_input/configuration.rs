@@ -416,6 +416,10 @@ fn clusters_chains_and_hairs_by_hand() {
         ),
         ("[[comb]]\nkind = \"chain\"\nat = [0.0, 5.0, 0.0]\n".to_owned(), "comb[1]|`turn` or `reach`"),
         ("[[comb]]\nkind = \"chain\"\nhair = \"w\"\nreach = [0.0, 5.0, 0.0]\n".to_owned(), "comb[1].hair|no hair `w`"),
+        (
+            "[[comb]]\nkind = \"chain\"\nat = [0, 5, 0]\nturn = [{ joint = 50, turn = [0, 0, 9] }]\n".to_owned(),
+            "comb[1].turn[0].joint|no joint 50|help:",
+        ),
         ("[[comb]]\nkind = \"mirror\"\n".to_owned(), "comb[1]|needs `plane`"),
         (
             "[[comb]]\nkind = \"cut\"\nkey = [{ at = [0, 5, 0], length = 1 }]\n".to_owned(),

@@ -284,9 +284,9 @@ fn starts(frames: &[Frame], hairs: &ControlHairs) -> Vec<Start> {
     frames.par_iter().enumerate().map(start).collect()
 }
 
-/// Turns segments toward those of a line of as many points, scene space.
+/// Turns segments toward those of a line of as many points, scene space; a line without length leaves a hair as it is.
 fn follow(line: &[Vec3], a: f64, curvature: f64, frame: &Frame, local: &mut [[f32; 3]]) -> CombCounts {
-    if a == 0.0 {
+    if a == 0.0 || line.windows(2).all(|w| w[0] == w[1]) {
         return CombCounts::default();
     }
     let mut ahead = line.windows(2).map(|w| to_local(frame, w[1] - w[0]).try_normalize(0.0));

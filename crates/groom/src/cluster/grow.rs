@@ -30,6 +30,10 @@ pub enum Length {
     Scaled(f64),
 }
 
+/// Least length over which a hair comes into its cluster, in ways there: the steepest that the way there shrinks is 1.5 over
+/// it, so that with 1.5 hair that comes from ahead stands still, and with less it turns back.
+const STEEP: f64 = 2.0;
+
 /// Puts hairs into clusters (`of`, one a hair): r and theta are those of the root in the cluster's region. `uv` in scalp
 /// space and `root` in scene units, one a hair.
 pub fn attach(tree: &Tree, of: &[u32], uv: &[[f64; 2]], root: &[Vec3]) -> Result<Vec<Rooted>, String> {
@@ -80,7 +84,7 @@ pub fn line(shape: &Shape, points: usize) -> Vec<Vec3> {
 }
 
 /// \[H * P\] points of hairs, scene units, root first: V(r, theta, t) at P equal steps of t. Where V does not begin in
-/// a hair's own root, the way there is added to the hair, less and less up to t = `blend` (above 0, up to 1; small, and
+/// a hair's own root, the way there is added to the hair, less and less up to t = `blend` or farther where it is long (above 0, up to 1; small, and
 /// hairs bend where they meet the skin). `length` is one for all or one a hair; cut hairs have equal segments.
 pub fn grow(tree: &Tree, hairs: &[Rooted], length: &[Length], points: usize, blend: f64) -> Result<Vec<Vec3>, String> {
     if points < 2 || !(blend > 0.0 && blend <= 1.0) {
@@ -107,21 +111,23 @@ pub fn grow(tree: &Tree, hairs: &[Rooted], length: &[Length], points: usize, ble
     let fine = if length.iter().any(|l| matches!(l, Length::Cut(_))) { BETWEEN } else { 1 };
     let steps = (points - 1) * fine;
     let t = |k: usize| k as f64 / steps as f64;
-    let sections = |k: usize| -> Result<Vec<Section>, String> {
+    let sections = |k: usize| -> Result<(Vec<Section>, f64), String> {
         if !used[k] {
-            return Ok(Vec::new());
+            return Ok(Default::default());
         }
         let shape = tree.shape(k as u32)?;
-        Ok((0..=steps).map(|i| shape.section(t(i))).collect())
+        Ok(((0..=steps).map(|i| shape.section(t(i))).collect(), shape.skeleton().length()))
     };
-    let sections: Vec<Vec<Section>> = (0..used.len()).into_par_iter().map(sections).collect::<Result<_, _>>()?;
-    let keep: Vec<f64> = (0..=steps).map(|k| fade(t(k) / blend)).collect();
+    let sections: Vec<(Vec<Section>, f64)> = (0..used.len()).into_par_iter().map(sections).collect::<Result<_, _>>()?;
     let mut out = vec![Vec3::zeros(); hairs.len() * points];
     out.par_chunks_mut(points).zip(hairs).enumerate().for_each(|(h, (out, hair))| {
-        let section = &sections[hair.cluster as usize];
+        let (section, way) = &sections[hair.cluster as usize];
         let [r, theta] = hair.at;
         let off = hair.root - section[0].point(r, theta);
-        let point = |k: usize| if k == 0 { hair.root } else { section[k].point(r, theta) + off * keep[k] };
+        // Over less, a hair that comes from far would double back.
+        let over = blend.max(STEEP * off.norm() / way).min(1.0);
+        let keep = |k: usize| fade(t(k) / over);
+        let point = |k: usize| if k == 0 { hair.root } else { section[k].point(r, theta) + off * keep(k) };
         let whole = |out: &mut [Vec3]| out.iter_mut().enumerate().for_each(|(k, p)| *p = point(k * fine));
         match length[if length.len() == 1 { 0 } else { h }] {
             Length::Natural => whole(out),
@@ -203,7 +209,7 @@ mod tests {
                 let off = hair.root - shape.point(hair.at[0], hair.at[1], 0.0);
                 for (k, p) in got.iter().enumerate() {
                     let t = k as f64 / 10.0;
-                    let x = 2.0 * t;
+                    let x = t / (2.0 * off.norm() / shape.skeleton().length()).clamp(0.5, 1.0);
                     let share = if x < 1.0 { 1.0 - 3.0 * x * x + 2.0 * x * x * x } else { 0.0 };
                     assert!((p - shape.point(hair.at[0], hair.at[1], t) - off * share).norm() < 1e-12);
                 }

@@ -142,10 +142,13 @@ impl Comb {
         out.turn.iter_mut().for_each(|t| t.turn = three(&t.turn));
         for p in &mut out.primitive {
             (p.strength, p.position, p.turn) = (one(&p.strength), three(&p.position), three(&p.turn));
+            p.direction = p.direction.as_ref().map(three);
+            (p.amplitude, p.phase) = (p.amplitude.as_ref().map(one), p.phase.as_ref().map(one));
         }
         for e in &mut out.element {
             e.strength = one(&e.strength);
             (e.velocity, e.at) = (e.velocity.as_ref().map(three), e.at.as_ref().map(three));
+            e.axis = e.axis.as_ref().map(three);
         }
         out
     }
@@ -155,9 +158,11 @@ impl Comb {
         let values = [&self.weight, &self.curvature].into_iter().chain(self.values().map(|(_, v)| v));
         let one = self.radius.iter().chain(&self.falloff).chain(self.primitive.iter().map(|p| &p.strength));
         let one = one.chain(self.element.iter().map(|e| &e.strength));
+        let one = one.chain(self.primitive.iter().flat_map(|p| p.amplitude.iter().chain(&p.phase)));
         let three = self.reach.iter().chain(self.turn.iter().map(|t| &t.turn));
         let three = three.chain(self.primitive.iter().flat_map(|p| [&p.position, &p.turn]));
-        let three = three.chain(self.element.iter().flat_map(|e| e.velocity.iter().chain(&e.at)));
+        let three = three.chain(self.primitive.iter().flat_map(|p| &p.direction));
+        let three = three.chain(self.element.iter().flat_map(|e| e.velocity.iter().chain(&e.at).chain(&e.axis)));
         values.map(|v| v.0.value.0.len()).chain(one.map(|k| k.0.len())).chain(three.map(|k| k.0.len())).any(|n| n > 1)
     }
 
@@ -330,6 +335,12 @@ impl Document<GroomFile> {
                 return Err(self.error(&format!("{key}.hair"), format!("there is no hair `{n}`"), NO_HAIR));
             }
             c.at.into_iter().flatten().try_for_each(|x| self.within(&format!("{key}.at"), x, -1e9, 1e9))?;
+            let last = self.value.control.points.saturating_sub(2);
+            if let Some((i, t)) = c.turn.iter().enumerate().find(|(_, t)| t.joint > last) {
+                let what = format!("there is no joint {} that turns anything", t.joint);
+                let help = format!("control hairs have joints 0 to {last} (control.points)");
+                return Err(self.error(&format!("{key}.turn[{i}].joint"), what, help));
+            }
         }
         c.plane.iter().try_for_each(|p| self.check_plane(&format!("{key}.plane"), p))
     }

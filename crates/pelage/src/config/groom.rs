@@ -534,8 +534,19 @@ impl Document<GroomFile> {
     fn check_layer(&self, key: &str, l: &Layer) -> Result<(), ConfigError> {
         let by_hand = !l.hairs.is_empty();
         let said = |f: &Feature| f.value != UNSAID;
-        if by_hand && said(&l.density) {
-            return Err(self.error(&format!("{key}.density"), "is not read beside `hairs`", "take one of the two out"));
+        for (name, given) in [
+            ("density", said(&l.density)),
+            ("in_clusters", l.in_clusters),
+            ("guides", l.guides != GuideChoice::Blend),
+            ("on_off", l.on_off.is_some()),
+        ] {
+            if by_hand && given {
+                return Err(self.error(
+                    &format!("{key}.{name}"),
+                    "is not read beside `hairs`",
+                    "take one of the two out",
+                ));
+            }
         }
         for (name, f) in [("density", &l.density), ("length", &l.length)] {
             if !by_hand && !said(f) {

@@ -19,8 +19,7 @@ pub struct Primitive {
     /// Its direction at a point.
     pub orientation: Orientation,
     /// constant: the direction. wave: where hair runs.
-    #[serde(default, deserialize_with = "some_exactly")]
-    pub direction: Option<[f64; 3]>,
+    pub direction: Option<Keyed<Vector>>,
     /// along, roller: a line, at least two points.
     #[serde(default, deserialize_with = "some_points")]
     pub points: Option<Vec<[f64; 3]>>,
@@ -34,9 +33,9 @@ pub struct Primitive {
     /// wave: its length, scene units.
     pub wavelength: Option<f64>,
     /// wave: greatest slope. Default: 0.5.
-    pub amplitude: Option<f64>,
+    pub amplitude: Option<Keyed<f64>>,
     /// wave: degrees; at 0 it begins at its steepest. Default: 0.
-    pub phase: Option<f64>,
+    pub phase: Option<Keyed<f64>>,
     /// Origin of its coordinates, scene units. Default: 0, 0, 0.
     #[serde(default = "origin")]
     pub position: Keyed<Vector>,
@@ -179,8 +178,7 @@ pub struct Element {
     /// source, vortex: a point, scene units.
     pub at: Option<Keyed<Vector>>,
     /// vortex: direction of its line.
-    #[serde(default, deserialize_with = "some_exactly")]
-    pub axis: Option<[f64; 3]>,
+    pub axis: Option<Keyed<Vector>>,
     /// filament: a line, at least two points.
     #[serde(default, deserialize_with = "some_points")]
     pub points: Option<Vec<[f64; 3]>>,
@@ -231,6 +229,10 @@ fn thousand() -> usize {
 
 fn nothing() -> Feature {
     super::groom::constant(0.0)
+}
+
+fn is_direction(v: &Vector) -> bool {
+    v.0 != [0.0; 3] && v.0.iter().all(|x| x.is_finite())
 }
 
 impl Document<GroomFile> {
@@ -316,8 +318,9 @@ impl Document<GroomFile> {
             ],
         )?;
         self.line(&format!("{key}.points"), p.points.as_ref())?;
-        for (name, v) in [("direction", p.direction), ("sway", p.sway)] {
-            if v.is_some_and(|v| v == [0.0; 3] || !v.iter().all(|x| x.is_finite())) {
+        let sway = p.sway.map(|v| Keyed::constant(Vector(v)));
+        for (name, k) in [("direction", &p.direction), ("sway", &sway)] {
+            if k.iter().any(|k| !k.0.iter().all(|k| is_direction(&k.value))) {
                 return Err(self.error(
                     &format!("{key}.{name}"),
                     "must be a direction",
@@ -328,10 +331,11 @@ impl Document<GroomFile> {
         for (name, x) in [("radius", p.radius), ("wavelength", p.wavelength)] {
             self.within(&format!("{key}.{name}"), x.unwrap_or(1.0), 1e-9, 1e9)?;
         }
-        let some = [("pitch", p.pitch), ("amplitude", p.amplitude), ("phase", p.phase)];
-        for (name, x) in some {
-            self.within(&format!("{key}.{name}"), x.unwrap_or(0.0), -1e9, 1e9)?;
+        self.within(&format!("{key}.pitch"), p.pitch.unwrap_or(0.0), -1e9, 1e9)?;
+        for (name, k) in [("amplitude", &p.amplitude), ("phase", &p.phase)] {
+            k.iter().try_for_each(|k| self.keyed(&format!("{key}.{name}"), k, |x| x.abs() <= 1e9))?;
         }
+        p.direction.iter().try_for_each(|k| self.keyed(&format!("{key}.direction"), k, is_direction))?;
         self.keyed(&format!("{key}.strength"), &p.strength, |x| x.abs() <= 1e9)?;
         for (name, k) in [("position", &p.position), ("turn", &p.turn)] {
             self.keyed(&format!("{key}.{name}"), k, |v| v.0.iter().all(|x| x.abs() <= 1e9))?;
@@ -399,10 +403,10 @@ impl Document<GroomFile> {
             let good = |v: &Vector| v.0.iter().all(|x| x.abs() <= 1e9);
             k.iter().try_for_each(|k| self.keyed(&format!("{key}.{name}"), k, good))?;
         }
-        e.axis.iter().flatten().try_for_each(|x| self.within(&format!("{key}.axis"), *x, -1e9, 1e9))?;
-        if e.axis == Some([0.0; 3]) {
+        if e.axis.iter().any(|k| !k.0.iter().all(|k| is_direction(&k.value))) {
             return Err(self.error(&format!("{key}.axis"), "must be a direction", "for example [1.0, 0.0, 0.0]"));
         }
+        e.axis.iter().try_for_each(|k| self.keyed(&format!("{key}.axis"), k, is_direction))?;
         self.keyed(&format!("{key}.strength"), &e.strength, |x| x.abs() <= 1e12)?;
         self.within(&format!("{key}.core"), e.core, 0.0, 1e9)
     }

@@ -150,6 +150,12 @@ impl Source {
     /// A complaint about a place.
     pub fn error(&self, span: Option<Range<usize>>, what: String, help: String) -> ConfigError {
         let part = &self.part[self.part_at(span.as_ref().map_or(0, |s| s.start))];
+        let preset = self.joins && part.text() == PRESETS;
+        let help = if preset && help.is_empty() {
+            "a table that is `like` this preset has no such key".to_owned()
+        } else {
+            help
+        };
         let span = span.map(|s| {
             let text = part.text();
             let [from, to] = [s.start, s.end].map(|x| x.saturating_sub(part.start).min(text.len()));

@@ -3,11 +3,12 @@
 use super::run::{Counts, Runner};
 use super::skin::Texel;
 use super::tables::{decode, encode, table};
-use super::{What, clusters, groom, instance, layer_seed, plan_look::joins_clumps};
+use super::{What, clusters, groom, guides, instance, layer_seed, plan_look::joins_clumps};
 use crate::Error;
 use crate::config::{Clump, LookValue, MapRef};
 use crate::format::ply::Column;
 use pelage_geom::{NONE, Vec3, rng};
+use pelage_groom::field::Region;
 use pelage_groom::instance::Roots;
 use pelage_groom::look::member::{
     Members, Sites, centres, members, nearest_hairs, representatives, rest_sites, sides, whole_clumps,
@@ -86,7 +87,8 @@ fn find(run: &mut Runner<'_>, i: usize, k: usize, what: What) -> Result<Members,
     let origin = groom::skin(run)?.origin();
     let relative: Vec<Vec<Vec3>> =
         partings.iter().map(|l| l.iter().map(|p| p - Vec3::from(origin)).collect()).collect();
-    let side = sides(&relative, f64::from(sizes.most()), &sites);
+    let mut side = sides(&relative, f64::from(sizes.most()), &sites);
+    part(&mut side, &guides::dividers(&run.project.groom.value), partings.len(), &at.position, Vec3::from(origin));
     sites.side = &side;
     let before = if joins_clumps(&c, k) { Some(clumps(run, i, k - 1)?) } else { None };
     let found = if let Some(level) = c.clusters {
@@ -201,6 +203,19 @@ fn in_regions(
     let map = run.map(map, Texel::Value)?;
     let value: Vec<f32> = roots.uv.iter().map(|uv| map.nearest(*uv)).collect();
     Ok(regions(sites, &value, near, open))
+}
+
+/// Adds on which side of dividers roots lie, from side number `first` on.
+fn part(side: &mut Vec<[u64; 2]>, dividers: &[Region], first: usize, position: &[[f32; 3]], origin: Vec3) {
+    if !dividers.is_empty() && side.is_empty() {
+        side.resize(position.len(), [0; 2]);
+    }
+    for (k, d) in dividers.iter().enumerate() {
+        let bit = 1 << ((first + k) % 64);
+        for (side, p) in side.iter_mut().zip(position) {
+            side[usize::from(d.contains(origin + Vec3::from(p.map(f64::from))))] |= bit;
+        }
+    }
 }
 
 /// Clusters of a level as clumps; centres are the hairs nearest to their middles.

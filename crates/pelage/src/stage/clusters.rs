@@ -267,7 +267,7 @@ pub(super) fn middles(tree: &Tree, of: &[u32], uv: &[[f64; 2]]) -> Vec<u32> {
 }
 
 /// Lines of `points` points at equal chords through the clusters that roots are in, root first, scene units: to their ends, or
-/// no longer than `length` where it is given. Roots without a cluster get lines without length.
+/// as long as `length` says where it is given. Roots without a cluster get lines without length.
 pub(super) fn lines(
     tree: &Tree,
     of: &[u32],
@@ -289,7 +289,14 @@ pub(super) fn lines(
     let grown = if within.is_empty() { Vec::new() } else { grow(tree, &rooted, &cut, points, start)? };
     let mut out: Vec<Vec3> = root.iter().flat_map(|r| std::iter::repeat_n(*r, points)).collect();
     for (h, line) in within.iter().zip(grown.chunks_exact(points)) {
-        out[h * points..][..points].copy_from_slice(&curve::resample(line, points));
+        let mut line = line.to_vec();
+        let own: f64 = line.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
+        let ahead = (line[points - 1] - line[points - 2]).try_normalize(0.0);
+        // Hair that is longer than its cluster goes straight on.
+        if let (Some(length), Some(ahead)) = (length.map(|l| l[*h]).filter(|l| *l > own), ahead) {
+            line.push(line[points - 1] + ahead * (length - own));
+        }
+        out[h * points..][..points].copy_from_slice(&curve::resample(&line, points));
     }
     Ok(Lines { points, at: out, straight_from: vec![points as u32; root.len()] })
 }

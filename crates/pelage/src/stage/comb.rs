@@ -73,7 +73,8 @@ fn comb_hairs(run: &mut Runner<'_>, what: What) -> Result<ControlHairs, Error> {
         .map(|(i, c)| operation(run, c, &read[i], trace[i].as_ref().map(|t| Guides(t))))
         .collect();
     let done = comb(&view(&skin), &lines, &ops, &mut hairs);
-    for (i, _) in combs.iter().zip(&done).enumerate().filter(|(_, (c, d))| c.kind == Kind::Mirror && d.combed == 0) {
+    let idle = |c: &Comb| c.kind == Kind::Mirror && c.weight.at(0.0) > 0.0;
+    for (i, _) in combs.iter().zip(&done).enumerate().filter(|(_, (c, d))| idle(c) && d.combed == 0) {
         run.warn_once(format!("comb[{i}] mirrors no hair: there is none on one side of its plane"));
     }
     let mut counts = Counts::from([

@@ -7,7 +7,8 @@ use super::tables::{decode, encode, table};
 use super::{What, clusters, groom};
 use crate::Error;
 use crate::config::{
-    Ball, Comb, CombKind, Element, ElementKind, Keyed, Orientation, Panels, Plane, Primitive, Region, Shear, Vector,
+    Ball, Comb, CombKind, Element, ElementKind, GroomFile, Keyed, Orientation, Panels, Plane, Primitive, Region, Shear,
+    Vector,
 };
 use crate::format::ply::{self, Column};
 use nalgebra::UnitQuaternion;
@@ -138,8 +139,9 @@ fn field_of(c: &Comb) -> GuideField {
 }
 
 fn primitive(p: &Primitive) -> field::Primitive {
+    let direction = || p.direction.as_ref().map_or(Vec3::zeros(), now);
     let orientation = match p.orientation {
-        Orientation::Constant => field::Orientation::Constant { direction: vector(p.direction) },
+        Orientation::Constant => field::Orientation::Constant { direction: direction() },
         Orientation::Radial => field::Orientation::Radial,
         Orientation::Around => field::Orientation::Around,
         Orientation::Along => field::Orientation::Along { points: points(p.points.as_ref()) },
@@ -150,11 +152,11 @@ fn primitive(p: &Primitive) -> field::Primitive {
             pitch: p.pitch.unwrap_or(0.1),
         },
         Orientation::Wave => field::Orientation::Wave {
-            along: vector(p.direction),
+            along: direction(),
             across: vector(p.sway),
             wavelength: p.wavelength.unwrap_or(1.0),
-            amplitude: p.amplitude.unwrap_or(0.5),
-            phase: p.phase.unwrap_or(0.0).to_radians(),
+            amplitude: p.amplitude.as_ref().map_or(0.5, |k| k.at(0.0)),
+            phase: p.phase.as_ref().map_or(0.0, |k| k.at(0.0)).to_radians(),
         },
     };
     let falloff = match &p.falloff {
@@ -181,8 +183,13 @@ fn primitive(p: &Primitive) -> field::Primitive {
     }
 }
 
+/// The dividers of all fields.
+pub(super) fn dividers(groom: &GroomFile) -> Vec<field::Region> {
+    groom.comb.iter().flat_map(|c| &c.divider).map(region).collect()
+}
+
 /// A part of space.
-pub(super) fn region(r: &Region) -> field::Region {
+fn region(r: &Region) -> field::Region {
     match (r.centre, r.radii) {
         (Some(centre), Some(radii)) => {
             field::Region::Ellipsoid { centre: centre.into(), rotation: turned(r.turn), radii: radii.into() }
@@ -216,7 +223,9 @@ fn element(e: &Element) -> flow::Element {
     match e.kind {
         ElementKind::Stream => flow::Element::Stream { velocity: e.velocity.as_ref().map_or(Vec3::zeros(), now) },
         ElementKind::Source => flow::Element::Source { at, strength, core },
-        ElementKind::Vortex => flow::Element::Vortex { at, axis: vector(e.axis), strength, core },
+        ElementKind::Vortex => {
+            flow::Element::Vortex { at, axis: e.axis.as_ref().map_or(Vec3::zeros(), now), strength, core }
+        }
         ElementKind::Filament => flow::Element::Filament { points: points(e.points.as_ref()), strength, core },
     }
 }

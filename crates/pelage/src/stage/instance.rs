@@ -166,6 +166,13 @@ fn grow(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
     let mut found = find_roots(&skin.mesh, &skin.topology, &candidates, &density, seed);
     let growing = clusters::growing(run, i, &found.root)?;
     if !growing.is_empty() {
+        let name = &run.project.groom.value.layer[i].name;
+        if !found.id.is_empty() && !growing.contains(&true) {
+            run.warnings.push(format!(
+                "layer {name}: none of its {} hairs is where `scalp.growth` and `in_clusters` let it grow",
+                found.id.len()
+            ));
+        }
         found = kept_roots(&found, &growing);
     }
     kept_roots_of(run, i, found)
@@ -231,7 +238,7 @@ pub fn weights(run: &mut Runner<'_>, i: usize) -> Result<Weights, Error> {
     let triangulation = triangulate(&sites, &mirrored_charts(&skin.mesh, &skin.topology));
     let mut found = find_weights(&roots, &triangulation);
     let groom = &run.project.groom.value;
-    let dividers: Vec<_> = groom.comb.iter().flat_map(|c| &c.divider).map(guides::region).collect();
+    let dividers = guides::dividers(groom);
     let layer = &groom.layer[i];
     let (choice, seed) = (layer.guides, u64::from(layer_seed(&layer.name)));
     let mut divided = 0;

@@ -412,14 +412,21 @@ impl<'a> Reader<'a> {
         r.param("per_cm2", candidate_density(layer.density.value), format!("{at}.density.value (candidates)"))
     }
 
+    /// Dividers of fields.
+    pub(super) fn dividers(&self, mut r: Recipe) -> Recipe {
+        let combs = self.project.groom.value.comb.iter().enumerate();
+        for (k, c) in combs.filter(|(_, c)| !c.divider.is_empty()) {
+            let at = format!("comb[{k}].divider");
+            r = r.param(&at, serde_json::to_string(&c.divider).expect("plain numbers"), self.in_groom(&at));
+        }
+        r
+    }
+
     /// What decides which control hairs the hairs of a layer follow, besides where they stand.
     fn weights(&self, i: usize) -> Recipe {
         let groom = &self.project.groom.value;
         let mut r = Recipe::new("instance/weights", version::WEIGHTS);
-        for (k, c) in groom.comb.iter().enumerate().filter(|(_, c)| !c.divider.is_empty()) {
-            let at = format!("comb[{k}].divider");
-            r = r.param(&at, serde_json::to_string(&c.divider).expect("plain numbers"), self.in_groom(&at));
-        }
+        r = self.dividers(r);
         let layer = &groom.layer[i];
         let at = |key: &str| self.in_groom(&format!("layer[{i}].{key}"));
         if layer.guides == GuideChoice::Copy {

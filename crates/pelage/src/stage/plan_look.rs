@@ -268,6 +268,7 @@ impl Reader<'_> {
             let key = format!("parting[{p}].points");
             r = r.param(&format!("parting[{p}]"), format!("{:?}", parting.points), self.in_groom(&key));
         }
+        r = self.dividers(r);
         r.param("of", if joins_clumps(c, k) { "clumps" } else { "hairs" }, self.in_groom(&format!("{at}.of")))
     }
 
