@@ -371,8 +371,8 @@ collision = { enabled = false }
     assert_eq!(crossing(&shot), 0, "no hair crosses it");
     shot.edit(
         GROOM,
-        "length = { value = 3.0 }",
-        "length = { value = 3.0 }\n[[layer.clump]]\ndensity = 0.2\nsize = 5.0\npercent = 1.0",
+        "collision = { enabled = false }",
+        "collision = { enabled = false }\n[[layer.clump]]\ndensity = 0.2\nsize = 5.0\npercent = 1.0",
     );
     shot.report(&[]);
     assert_eq!(crossing(&shot), 0, "no clump reaches across it");
