@@ -82,7 +82,7 @@ kind = "cluster"
 name = "hair"
 in_clusters = true
 density = { value = 3.0 }
-length = { value = 13.0 }
+length = { value = 20.0 }
 points = 60
 
 [layer.cluster]
@@ -99,9 +99,9 @@ fn a_braid_of_braids_is_within_its_cluster_and_edits_of_it_are_told() {
         let root = line[0];
         assert!((root[0].hypot(root[1]).hypot(root[2]) - 5.0).abs() < 0.1, "{name:?} is rooted on the ball");
         // All are as long as they should be, end near the cluster's end, and are inside of it from where they have come together.
-        assert!((length(line) - 13.0).abs() < 0.1, "{name:?} is {} long", length(line));
+        assert!((19.8..20.01).contains(&length(line)), "{name:?} is {} long", length(line));
         let tip = line[line.len() - 1];
-        assert!(tip[1] > 14.0 && tip[1] < 18.0 && tip[0].hypot(tip[2]) < 1.6, "{name:?} ends at {tip:?}");
+        assert!(tip[1] > 13.0 && tip[1] < 18.5 && tip[0].hypot(tip[2]) < 1.6, "{name:?} ends at {tip:?}");
         for p in line.iter().filter(|p| p[1] > 10.0) {
             assert!(p[0].hypot(p[2]) < 1.65, "{name:?} at {p:?}");
         }

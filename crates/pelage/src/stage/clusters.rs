@@ -296,7 +296,14 @@ pub(super) fn lines(
         if let (Some(length), Some(ahead)) = (length.map(|l| l[*h]).filter(|l| *l > own), ahead) {
             line.push(line[points - 1] + ahead * (length - own));
         }
-        out[h * points..][..points].copy_from_slice(&curve::resample(&line, points));
+        let mut line = curve::resample(&line, points);
+        let own: f64 = line.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
+        // Chords are shorter than what they span.
+        if let Some(length) = length.map(|l| l[*h]).filter(|_| own > 0.0) {
+            let (root, by) = (line[0], length / own);
+            line.iter_mut().for_each(|p| *p = root + (*p - root) * by);
+        }
+        out[h * points..][..points].copy_from_slice(&line);
     }
     Ok(Lines { points, at: out, straight_from: vec![points as u32; root.len()] })
 }
