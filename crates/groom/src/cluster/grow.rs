@@ -58,7 +58,7 @@ pub fn fill(shape: &Shape, n: usize) -> Vec<[f64; 2]> {
 
 /// Hairs that fill the leaves of a tree evenly, `density` hairs per unit of area across the roots of clusters (scene
 /// units squared), to the next whole number in each. Where clusters overlap they add up: sample the skin and find
-/// [`Owners`] where that shows.
+/// [`super::Owners`] where that shows.
 pub fn fill_leaves(tree: &Tree, density: f64) -> Result<Vec<Rooted>, String> {
     if !(0.0..).contains(&density) {
         return Err(format!("a density of hairs can't be {density}"));
