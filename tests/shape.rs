@@ -41,6 +41,13 @@ fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|x| (a[x] - b[x]) * (a[x] - b[x])).sum::<f64>().sqrt()
 }
 
+/// The outputs are those of a run that starts from nothing.
+fn is_as_from_nothing(shot: &ShotFolder) {
+    let fresh = shot.fresh();
+    fresh.report(&[]);
+    assert!(shot.outputs() == fresh.outputs());
+}
+
 fn refused(shot: &ShotFolder, words: &[&str]) {
     let out = shot.pelage(&["run", "--quiet"]);
     let said = String::from_utf8_lossy(&out.stderr).into_owned();
@@ -125,13 +132,7 @@ fn a_braid_of_braids_is_within_its_cluster_and_edits_of_it_are_told() {
     assert!(leaning.keys().eq(hairs.keys()), "the same hairs");
     let mean = leaning.values().map(|l| l[l.len() - 1][0]).sum::<f64>() / leaning.len() as f64;
     assert!((mean - 0.85).abs() < 0.35, "{mean}");
-    assert!(
-        shot.outputs() == {
-            let fresh = shot.fresh();
-            fresh.report(&[]);
-            fresh.outputs()
-        }
-    );
+    is_as_from_nothing(&shot);
 }
 
 #[test]
@@ -322,13 +323,7 @@ fn key_frames_move_control_hairs() {
     );
     assert_eq!(why.iter().collect::<Vec<_>>(), ["grooms/ball.toml: comb[0].angle 60 -> 50"]);
     shot.report(&[]);
-    assert!(
-        shot.outputs() == {
-            let fresh = shot.fresh();
-            fresh.report(&[]);
-            fresh.outputs()
-        }
-    );
+    is_as_from_nothing(&shot);
     // Simulated hair could not follow.
     shot.edit(SHOT, "target = \"off\"", "target = \"every-hair\"");
     refused(&shot, &["comb[0]", "key frames", "layer coat is simulated", "simulate = \"off\""]);
@@ -434,13 +429,7 @@ fn an_edited_element_of_a_flow_factors_nothing_again() {
         ["grooms/ball.toml: comb[0].element[0].velocity [0.0,-1.0,0.0] -> [0.5,-1.0,0.0]"]
     );
     shot.report(&[]);
-    assert!(
-        shot.outputs() == {
-            let fresh = shot.fresh();
-            fresh.report(&[]);
-            fresh.outputs()
-        }
-    );
+    is_as_from_nothing(&shot);
     shot.edit(GROOM, "most = 200", "most = 150");
     assert!(shot.plan(&[]).0.contains("groom/panels[0]"));
 }

@@ -20,6 +20,7 @@ impl Cells {
         [p.x, p.y, p.z].map(|x| (x / self.size).floor() as i64)
     }
 
+    /// Adds a point; its number is how many came before it.
     pub fn insert(&mut self, p: Vec3) {
         self.cell.entry(self.key(p)).or_default().push((self.count, p));
         self.count += 1;
@@ -36,6 +37,7 @@ impl Cells {
             .copied()
     }
 
+    /// True if a point is within a radius of `p`.
     pub fn any_within(&self, p: Vec3, radius: f64) -> bool {
         self.near(p).any(|(_, q)| (q - p).norm() <= radius)
     }

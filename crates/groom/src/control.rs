@@ -60,6 +60,11 @@ impl ControlHairs {
         self.root.is_empty()
     }
 
+    /// The hair that is number `single` of those placed one by one.
+    pub fn placed_alone(&self, single: u32) -> Option<usize> {
+        self.single.iter().position(|s| *s == single)
+    }
+
     /// Points of hair `h` in its root frame, root first.
     pub fn hair(&self, h: usize) -> &[[f32; 3]] {
         &self.local[h * self.points..(h + 1) * self.points]

@@ -119,15 +119,19 @@ fn read_mcap(path: &Path, frame: Option<f64>) -> Result<CurveFile, FormatError> 
 }
 
 impl CurveFile {
-    /// All layers as one list of strands relative to the scene's origin.
+    /// All layers as one list of strands relative to the first one's origin; those without ids are numbered.
     pub fn joined(&self) -> Strands {
-        let mut all = Strands::default();
+        let origin = self.layers.first().map_or([0.0; 3], |l| l.strands.origin);
+        let mut all = Strands { origin, ..Strands::default() };
         let counts = self.layers.iter().flat_map(|l| l.strands.offsets.counts());
         all.offsets = pelage_geom::Offsets::from_counts(counts);
         for l in &self.layers {
-            let o = l.strands.origin;
-            let placed = |p: &[f32; 3]| std::array::from_fn(|x| (f64::from(p[x]) + o[x]) as f32);
+            let to: [f64; 3] = std::array::from_fn(|x| l.strands.origin[x] - origin[x]);
+            let placed = |p: &[f32; 3]| std::array::from_fn(|x| (f64::from(p[x]) + to[x]) as f32);
             all.position.extend(l.strands.position.iter().map(placed));
+            let before = all.id.len();
+            let id = |h: usize| l.strands.id.get(h).copied().unwrap_or((before + h) as u64);
+            all.id.extend((0..l.strands.len()).map(id));
         }
         all
     }

@@ -1,7 +1,7 @@
 //! Braids: a cluster is parted among strands that weave along it.
 
 use super::split::cells;
-use super::{Cluster, Contour, Curve, Cylinder, Region, Shape, Tree};
+use super::{Cluster, Curve, Cylinder, Region, Shape, Tree, fade};
 use pelage_geom::Vec3;
 use std::f64::consts::TAU;
 
@@ -77,8 +77,7 @@ pub fn braid(tree: &mut Tree, cluster: u32, braid: &Braid) -> Result<Vec<u32>, S
         let share = (region.area() / whole).sqrt();
         let at = |k: usize| {
             let t = k as f64 / (points - 1) as f64;
-            let x = (t / start).min(1.0);
-            let woven = x * x * (3.0 - 2.0 * x);
+            let woven = 1.0 - fade(t / start);
             let to = across(TAU * turns * t + phase);
             let [x, y] = [0, 1].map(|i| root[i] + (to[i] - root[i]) * woven);
             let section = shape.section(t);
@@ -87,14 +86,8 @@ pub fn braid(tree: &mut Tree, cluster: u32, braid: &Braid) -> Result<Vec<u32>, S
         };
         let (control, width): (Vec<Vec3>, Vec<f64>) = (0..points).map(at).unzip();
         let first = shape.section(0.0);
-        let mut out = Cylinder {
-            control,
-            axis: first.axes[0],
-            side: first.axes[1],
-            contour: Contour::constant(vec![1.0]),
-            scale: [Curve::constant(1.0), Curve::constant(1.0)],
-            twist: Curve::constant(untwisted),
-        };
+        let mut out = Cylinder::plain(control, first.axes[0], first.axes[1], vec![1.0]);
+        out.twist = Curve::constant(untwisted);
         let t = Shape::new(&out)?.skeleton().control_t();
         out.scale = [0, 1].map(|_| Curve { t: t.clone(), value: width.clone() });
         Ok(Cluster { parent: cluster, region, cylinder: out })

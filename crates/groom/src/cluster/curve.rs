@@ -19,6 +19,21 @@ impl Curve {
         Curve { t: vec![0.0], value: vec![value] }
     }
 
+    /// Values at equal distances from root to tip.
+    pub fn even(value: Vec<f64>) -> Self {
+        let last = (value.len().max(2) - 1) as f64;
+        Curve { t: (0..value.len()).map(|k| k as f64 / last).collect(), value }
+    }
+
+    /// What `join` makes of this curve and another, at the stations of both.
+    pub fn joined(&self, other: &Curve, join: impl Fn(f64, f64) -> f64) -> Self {
+        let mut t: Vec<f64> = self.t.iter().chain(&other.t).copied().collect();
+        t.sort_by(f64::total_cmp);
+        t.dedup();
+        let value = t.iter().map(|s| join(self.at(*s), other.at(*s))).collect();
+        Curve { t, value }
+    }
+
     /// Value at `t`; 0 without stations.
     pub fn at(&self, t: f64) -> f64 {
         self.both(t).0

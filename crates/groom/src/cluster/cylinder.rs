@@ -47,10 +47,15 @@ impl Cylinder {
     /// A cylinder along `control` with the same contour everywhere (radii at equal angles from the direction of u to
     /// that of v), without scale and twist. `root` is the skin's frame at its root.
     pub fn new(control: Vec<Vec3>, root: &Frame, radius: Vec<f64>) -> Self {
+        Cylinder::plain(control, root.n, root.du, radius)
+    }
+
+    /// The same from an axis and a side of its root.
+    pub(super) fn plain(control: Vec<Vec3>, axis: Vec3, side: Vec3, radius: Vec<f64>) -> Self {
         Cylinder {
             control,
-            axis: root.n,
-            side: root.du,
+            axis,
+            side,
             contour: Contour::constant(radius),
             scale: [Curve::constant(1.0), Curve::constant(1.0)],
             twist: Curve::constant(0.0),

@@ -149,15 +149,61 @@ pub fn grow(tree: &Tree, hairs: &[Rooted], length: &[Length], points: usize, ble
     Ok(out)
 }
 
-/// Share of the way to the root that is left: 1 at 0, 0 from 1 on, with no slope at either.
-fn fade(x: f64) -> f64 {
+/// \[H * P\] points of a line for each root, root first, scene units, with equal chords: through its cluster (`of`, or
+/// [`NONE`]) to the end of that, or as long as `length` says where it is given: cut, or straight on beyond the cluster.
+/// Roots without a cluster get lines without length. `start` as `blend` in [`grow`].
+pub fn lines(
+    tree: &Tree,
+    of: &[u32],
+    uv: &[[f64; 2]],
+    root: &[Vec3],
+    length: Option<&[f64]>,
+    points: usize,
+    start: f64,
+) -> Result<Vec<Vec3>, String> {
+    let mut out: Vec<Vec3> = root.iter().flat_map(|r| std::iter::repeat_n(*r, points)).collect();
+    let within: Vec<usize> = (0..of.len()).filter(|h| of[*h] != NONE).collect();
+    if within.is_empty() {
+        return Ok(out);
+    }
+    let rooted: Vec<Rooted> = attach(tree, of, uv, root)?.into_iter().filter(|h| h.cluster != NONE).collect();
+    let cut: Vec<Length> = match length {
+        Some(length) => within.iter().map(|h| Length::Cut(length[*h].max(f64::MIN_POSITIVE))).collect(),
+        None => vec![Length::Natural],
+    };
+    let grown = grow(tree, &rooted, &cut, points, start)?;
+    for (h, line) in within.iter().zip(grown.chunks_exact(points)) {
+        let length = length.map(|l| l[*h]);
+        let mut line = line.to_vec();
+        let own = way(&line);
+        let ahead = (line[points - 1] - line[points - 2]).try_normalize(0.0);
+        if let (Some(length), Some(ahead)) = (length.filter(|l| *l > own), ahead) {
+            line.push(line[points - 1] + ahead * (length - own));
+        }
+        let out = &mut out[h * points..][..points];
+        out.copy_from_slice(&curve::resample(&line, points));
+        // Chords are shorter than what they span.
+        if let Some(length) = length {
+            scale(out, length);
+        }
+    }
+    Ok(out)
+}
+
+/// Length of a polyline.
+fn way(line: &[Vec3]) -> f64 {
+    line.windows(2).map(|w| (w[1] - w[0]).norm()).sum()
+}
+
+/// Share of a way that is left: 1 at 0, 0 from 1 on, with no slope at either.
+pub fn fade(x: f64) -> f64 {
     let x = x.min(1.0);
     1.0 - x * x * (3.0 - 2.0 * x)
 }
 
 /// Scales a hair about its root to a length; one without length stays.
 fn scale(hair: &mut [Vec3], length: f64) {
-    let now: f64 = hair.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
+    let now = way(hair);
     let root = hair[0];
     if now > 0.0 {
         hair[1..].iter_mut().for_each(|p| *p = root + (*p - root) * (length / now));
@@ -187,8 +233,21 @@ mod tests {
     use pelage_geom::rng::uniform;
     use std::f64::consts::TAU;
 
-    fn way(hair: &[Vec3]) -> f64 {
-        hair.windows(2).map(|w| (w[1] - w[0]).norm()).sum()
+    #[test]
+    fn lines_are_as_long_as_asked_and_go_straight_on_beyond_their_cluster() {
+        let tree = Tree { cluster: vec![upright([0.0; 2], 1.0)] };
+        let uv = [[0.2, 0.3], [0.0, 0.0], [5.0, 5.0]];
+        let root = uv.map(|[x, y]| Vec3::new(x, y, 0.0));
+        let of = Owners::find(&tree, &uv).at(3);
+        assert_eq!(of, [0, 0, NONE]);
+        let long = lines(&tree, &of, &uv, &root, Some(&[2.5, 9.0, 1.0]), 6, 0.1).expect("lines");
+        for (line, (root, length)) in long.chunks(6).zip(root.iter().zip([2.5, 9.0, 0.0])) {
+            assert!(line[0] == *root && (way(line) - length).abs() < 1e-12);
+            assert!(line.windows(2).all(|w| ((w[1] - w[0]).norm() - length / 5.0).abs() < 1e-5));
+        }
+        assert!((long[11] - Vec3::z() * 9.0).norm() < 1e-9, "straight on along the cluster, which is 4 long");
+        let whole = lines(&tree, &of, &uv, &root, None, 6, 0.1).expect("lines");
+        assert!((way(&whole[..6]) - 4.0).abs() < 1e-9);
     }
 
     #[test]

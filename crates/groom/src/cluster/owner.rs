@@ -76,10 +76,28 @@ impl Owners {
         (0..self.owner.len() / self.levels.max(1)).map(|h| self.leaf(h)).collect()
     }
 
+    /// \[H\] the owner of each hair at a level: its last if it has none there.
+    pub fn at(&self, level: usize) -> Vec<u32> {
+        let own = |h: usize| self.path(h).get(level).copied().filter(|k| *k != NONE);
+        (0..self.owner.len() / self.levels.max(1)).map(|h| own(h).unwrap_or_else(|| self.leaf(h))).collect()
+    }
+
     /// The last owner of hair `h`, or [`NONE`].
     pub fn leaf(&self, h: usize) -> u32 {
         self.path(h).iter().rev().copied().find(|k| *k != NONE).unwrap_or(NONE)
     }
+}
+
+/// \[clusters\] which of the hairs of each cluster is the nearest to its middle, or [`NONE`] for one without hairs. `of`: the
+/// cluster of each hair or [`NONE`]; `uv`: its root in scalp space.
+pub fn middles(tree: &Tree, of: &[u32], uv: &[[f64; 2]]) -> Vec<u32> {
+    let mut best = vec![(f64::INFINITY, NONE); tree.cluster.len()];
+    for (h, (k, at)) in of.iter().zip(uv).enumerate().filter(|(_, (k, _))| **k != NONE) {
+        let r = tree.cluster[*k as usize].region.polar(*at)[0];
+        let best = &mut best[*k as usize];
+        *best = if r < best.0 { (r, h as u32) } else { *best };
+    }
+    best.into_iter().map(|b| b.1).collect()
 }
 
 #[cfg(test)]

@@ -136,14 +136,7 @@ fn child(parent: &Shape, around: &Region, region: &Region, points: usize) -> Res
     let at = |k: usize| parent.section(k as f64 / (points - 1) as f64);
     let control: Vec<Vec3> = (0..points).map(at).map(|s| s.point(centre[0], centre[1])).collect();
     let root = parent.section(0.0);
-    let mut out = Cylinder {
-        control,
-        axis: root.axes[0],
-        side: root.axes[1],
-        contour: Contour::constant(vec![1.0]),
-        scale: [Curve::constant(1.0), Curve::constant(1.0)],
-        twist: Curve::constant(0.0),
-    };
+    let mut out = Cylinder::plain(control, root.axes[0], root.axes[1], vec![1.0]);
     let shape = Shape::new(&out)?;
     let t = shape.skeleton().control_t();
     let (mut twist, mut radius): (Vec<f64>, Vec<f64>) = Default::default();

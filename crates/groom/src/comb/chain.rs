@@ -40,7 +40,7 @@ pub(super) struct Motion {
 /// The hair that a handle names.
 pub(super) fn find(handle: &Handle, frames: &[Frame], hairs: &ControlHairs) -> Option<usize> {
     match *handle {
-        Handle::Single(number) => hairs.single.iter().position(|&s| s == number),
+        Handle::Single(number) => hairs.placed_alone(number),
         Handle::Nearest(point) => {
             let distance = |h: usize| (frames[h].origin - point).norm_squared();
             (0..frames.len()).min_by(|&a, &b| distance(a).total_cmp(&distance(b)))

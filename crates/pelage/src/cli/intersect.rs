@@ -3,7 +3,7 @@
 use super::print;
 use crate::Error;
 use crate::curves;
-use pelage_geom::{Offsets, Vec3, curve};
+use pelage_geom::{Offsets, Strands, Vec3, curve};
 use pelage_groom::chain::ellipsoid::{Ellipsoid, contacts};
 use pelage_groom::chain::{Chains, pairs::check};
 use pelage_groom::spline::BSpline;
@@ -110,24 +110,15 @@ pub fn run(a: &IntersectArguments) -> Result<bool, Error> {
 fn report(a: &IntersectArguments) -> Result<Report, Error> {
     let file = curves::read(&a.curves, a.frame)?;
     let wrong = |e: String| Error::input(format!("{}: {e}", a.curves.display()), "");
-    let mut position: Vec<[f32; 3]> = Vec::new();
-    let (mut counts, mut radius, mut id) = (Vec::new(), Vec::new(), Vec::new());
-    let origin = file.layers.first().map_or([0.0; 3], |l| l.strands.origin);
-    for layer in &file.layers {
-        let s = &layer.strands;
-        if a.width.is_none() && layer.width.len() != s.position.len() {
-            let help = "say how thick hairs are: --width DIAMETER, in scene units";
-            return Err(Error::input(format!("{} has no widths", a.curves.display()), help));
-        }
-        let to: [f64; 3] = std::array::from_fn(|x| s.origin[x] - origin[x]);
-        position
-            .extend(s.position.iter().map(|p| std::array::from_fn::<f32, 3, _>(|x| (f64::from(p[x]) + to[x]) as f32)));
-        counts.extend((0..s.len()).map(|h| s.offsets.range(h).len()));
-        radius.extend((0..s.position.len()).map(|k| 0.5 * a.width.map_or_else(|| layer.width[k], |w| w as f32)));
-        let before = id.len();
-        id.extend((0..s.len()).map(|h| s.id.get(h).copied().unwrap_or((before + h) as u64)));
+    if a.width.is_none() && file.layers.iter().any(|l| l.width.len() != l.strands.position.len()) {
+        let help = "say how thick hairs are: --width DIAMETER, in scene units";
+        return Err(Error::input(format!("{} has no widths", a.curves.display()), help));
     }
-    let offsets = Offsets::from_counts(counts);
+    let Strands { offsets, origin, position, id, .. } = file.joined();
+    let radius: Vec<f32> = match a.width {
+        Some(width) => vec![0.5 * width as f32; position.len()],
+        None => file.layers.iter().flat_map(|l| &l.width).map(|w| 0.5 * w).collect(),
+    };
     let chains = match a.spline {
         None => Chains::of_polylines(&position, &offsets, &radius),
         Some(tolerance) => splines(&position, &offsets, &radius, tolerance),

@@ -1,7 +1,6 @@
 //! Clusters of hair: where they stand, what they follow, and how they are split, braided and copied.
 
 use super::GroomFile;
-use super::comb::one;
 use super::document::{ConfigError, Document, exactly, some_exactly};
 use super::groom::{MapRef, points, some_points};
 use super::look_value::LookValue;
@@ -110,7 +109,7 @@ pub enum ClusterEditKind {
 #[serde(deny_unknown_fields)]
 pub struct ClusterLook {
     /// How far hairs come to their place in their cluster, 0 to 1. Default: 1.
-    #[serde(default = "all")]
+    #[serde(default = "super::look::one")]
     pub percent: LookValue,
     /// Level of the clusters that they follow: 0 for those of the file. Default: the last that they are in.
     pub level: Option<usize>,
@@ -122,15 +121,19 @@ pub struct ClusterLook {
     pub simulate: bool,
 }
 
-fn all() -> LookValue {
-    LookValue::constant(one())
-}
-
 fn part() -> f64 {
     0.15
 }
 
 impl Document<GroomFile> {
+    /// Complains about a key that reads clusters where there are none.
+    pub(super) fn needs_clusters(&self, key: &str) -> Result<(), ConfigError> {
+        match self.value.cluster.is_empty() {
+            true => Err(self.error(key, "there are no clusters", "add a [[cluster]]")),
+            false => Ok(()),
+        }
+    }
+
     pub(super) fn check_clusters(&self) -> Result<(), ConfigError> {
         let groom = &self.value;
         self.check_scalp(&groom.scalp)?;

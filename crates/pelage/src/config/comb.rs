@@ -2,7 +2,7 @@
 
 use super::GroomFile;
 use super::document::{ConfigError, Document, exactly, some_exactly};
-use super::groom::{MapRef, is_named, some_points};
+use super::groom::{MapRef, some_points};
 use super::guides::{Ball, Element, Panels, Plane, Primitive, Region, Shear};
 use super::keyed::{Keyed, Vector};
 use super::look_value::{LookValue, varied};
@@ -19,7 +19,7 @@ pub struct Comb {
     /// Names of hairs placed one by one (or beginnings of names, `whisker*`) that it acts on. Default: all hairs.
     pub hairs: Option<Vec<String>>,
     /// Strength, 0 to 1. Default: 1.
-    #[serde(default = "whole")]
+    #[serde(default = "super::look::one")]
     pub weight: LookValue,
     /// Painted strength: a map that multiplies the weight.
     pub region: Option<MapRef>,
@@ -33,7 +33,7 @@ pub struct Comb {
     /// direction-curve, direction-map, field, flow, cluster: how far hairs turn toward the direction, 0 to 1. Default: 1.
     pub bend: Option<LookValue>,
     /// 0: the whole hair turns at its root; 1: the turn grows from root to tip. Default: 0.
-    #[serde(default = "none")]
+    #[serde(default = "super::look::zero")]
     pub curvature: LookValue,
     /// direction-curve, field, flow, cluster, cut: acts only on one side of a parting.
     pub parting: Option<String>,
@@ -88,18 +88,6 @@ pub struct Comb {
     pub scalp: Option<Ball>,
 }
 
-pub(super) fn one() -> f64 {
-    1.0
-}
-
-fn whole() -> LookValue {
-    LookValue::constant(1.0)
-}
-
-fn none() -> LookValue {
-    LookValue::constant(0.0)
-}
-
 /// A length of hair at a place.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -124,46 +112,36 @@ pub struct JointTurn {
 impl Comb {
     /// It at a frame: without key frames.
     pub fn at(&self, frame: f64) -> Comb {
-        let one = |k: &Keyed<f64>| Keyed::constant(k.at(frame));
-        let three = |k: &Keyed<Vector>| Keyed::constant(Vector(k.vectors().at(frame)));
-        let value = |v: &LookValue| v.still(frame);
         let mut out = self.clone();
-        (out.weight, out.curvature) = (value(&self.weight), value(&self.curvature));
-        for (to, from) in [
-            (&mut out.bend, &self.bend),
-            (&mut out.angle, &self.angle),
-            (&mut out.amount, &self.amount),
-            (&mut out.value, &self.value),
-        ] {
-            *to = from.as_ref().map(value);
-        }
-        (out.radius, out.falloff) = (self.radius.as_ref().map(one), self.falloff.as_ref().map(one));
-        out.reach = self.reach.as_ref().map(three);
-        out.turn.iter_mut().for_each(|t| t.turn = three(&t.turn));
-        for p in &mut out.primitive {
-            (p.strength, p.position, p.turn) = (one(&p.strength), three(&p.position), three(&p.turn));
-            p.direction = p.direction.as_ref().map(three);
-            (p.amplitude, p.phase) = (p.amplitude.as_ref().map(one), p.phase.as_ref().map(one));
-        }
-        for e in &mut out.element {
-            e.strength = one(&e.strength);
-            (e.velocity, e.at) = (e.velocity.as_ref().map(three), e.at.as_ref().map(three));
-            e.axis = e.axis.as_ref().map(three);
-        }
+        out.each_keyed(&mut |k| *k = Keyed::constant(k.at(frame)), &mut |k| {
+            *k = Keyed::constant(Vector(k.vectors().at(frame)))
+        });
         out
     }
 
     /// True if something of it has key frames.
     pub fn is_animated(&self) -> bool {
-        let values = [&self.weight, &self.curvature].into_iter().chain(self.values().map(|(_, v)| v));
-        let one = self.radius.iter().chain(&self.falloff).chain(self.primitive.iter().map(|p| &p.strength));
-        let one = one.chain(self.element.iter().map(|e| &e.strength));
-        let one = one.chain(self.primitive.iter().flat_map(|p| p.amplitude.iter().chain(&p.phase)));
-        let three = self.reach.iter().chain(self.turn.iter().map(|t| &t.turn));
-        let three = three.chain(self.primitive.iter().flat_map(|p| [&p.position, &p.turn]));
-        let three = three.chain(self.primitive.iter().flat_map(|p| &p.direction));
-        let three = three.chain(self.element.iter().flat_map(|e| e.velocity.iter().chain(&e.at).chain(&e.axis)));
-        values.map(|v| v.0.value.0.len()).chain(one.map(|k| k.0.len())).chain(three.map(|k| k.0.len())).any(|n| n > 1)
+        let (mut one, mut three) = (1, 1);
+        self.clone().each_keyed(&mut |k| one = one.max(k.0.len()), &mut |k| three = three.max(k.0.len()));
+        one.max(three) > 1
+    }
+
+    /// Everything of it that may have key frames: numbers, and vectors.
+    fn each_keyed(&mut self, one: &mut dyn FnMut(&mut Keyed<f64>), three: &mut dyn FnMut(&mut Keyed<Vector>)) {
+        let values = [&mut self.weight, &mut self.curvature].into_iter();
+        let some = [&mut self.bend, &mut self.angle, &mut self.amount, &mut self.value].into_iter().flatten();
+        values.chain(some).for_each(|v| one(&mut v.0.value));
+        [&mut self.radius, &mut self.falloff].into_iter().flatten().for_each(&mut *one);
+        self.reach.iter_mut().chain(self.turn.iter_mut().map(|t| &mut t.turn)).for_each(&mut *three);
+        for p in &mut self.primitive {
+            one(&mut p.strength);
+            [&mut p.amplitude, &mut p.phase].into_iter().flatten().for_each(&mut *one);
+            [&mut p.position, &mut p.turn].into_iter().chain(&mut p.direction).for_each(&mut *three);
+        }
+        for e in &mut self.element {
+            one(&mut e.strength);
+            [&mut e.velocity, &mut e.at, &mut e.axis].into_iter().flatten().for_each(&mut *three);
+        }
     }
 
     /// Values that only some kinds read, by key.
@@ -284,8 +262,8 @@ impl Document<GroomFile> {
         };
         self.keys(key, &given.map(read))?;
         self.check_guides(key, c)?;
-        if c.kind == Cluster && self.value.cluster.is_empty() {
-            return Err(self.error(key, "there are no clusters", "add a [[cluster]]"));
+        if c.kind == Cluster {
+            self.needs_clusters(key)?;
         }
         if c.points.as_ref().is_some_and(|p| p.len() < 2 || !p.iter().flatten().all(|x| x.is_finite())) {
             return Err(self.error(&format!("{key}.points"), "must be two or more finite points", ""));
@@ -346,7 +324,7 @@ impl Document<GroomFile> {
     }
 
     pub(super) fn has_hair(&self, pattern: &String) -> bool {
-        self.value.control.hair.iter().any(|h| is_named(&h.name, std::slice::from_ref(pattern)))
+        !self.value.control.named(std::slice::from_ref(pattern)).is_empty()
     }
 
     /// Checks a value, or key frames, each.
@@ -354,10 +332,7 @@ impl Document<GroomFile> {
         if !k.0.iter().all(|k| good(&k.value) && k.frame.abs() <= 1e9) {
             return Err(self.error(key, "has a number that is out of range", "see the reference for what it may be"));
         }
-        if !k.in_order() {
-            return Err(self.error(key, "key frames are not in order", "write one or more, each after the one before"));
-        }
-        Ok(())
+        self.check_keys(key, k)
     }
 }
 

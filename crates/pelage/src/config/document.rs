@@ -190,12 +190,12 @@ pub(super) fn tidy(path: &Path) -> PathBuf {
     out.iter().collect()
 }
 
-pub(super) fn plain(path: &Path, what: String, help: String) -> ConfigError {
+fn plain(path: &Path, what: String, help: String) -> ConfigError {
     let source = Box::new(NamedSource::new(path.display().to_string(), String::new()));
     ConfigError { path: path.to_path_buf(), what, help, source, span: None }
 }
 
-fn first_line(message: &str) -> String {
+pub(super) fn first_line(message: &str) -> String {
     message.lines().collect::<Vec<_>>().join("; ")
 }
 
@@ -215,7 +215,7 @@ pub(super) fn nearest<'a>(wrong: &str, known: impl Iterator<Item = &'a str>) -> 
 }
 
 /// Byte range of a key's value, or of the nearest enclosing value that exists.
-pub(super) fn span_of(root: &DeTable<'_>, key: &str) -> Option<Range<usize>> {
+fn span_of(root: &DeTable<'_>, key: &str) -> Option<Range<usize>> {
     let mut span = None;
     let mut at: Option<&DeValue<'_>> = None;
     for part in key.split('.') {

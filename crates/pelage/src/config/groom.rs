@@ -2,11 +2,12 @@
 
 use super::cluster::{Cluster, ClusterEdit, ClusterLook, Scalp};
 use super::comb::{Comb, NO_HAIR};
+use super::control::Control;
 use super::document::{ConfigError, Document, Fixed, exactly};
 use super::look::{Clump, Collision, Curl, Emitter, Noise, Operator, Wave, WindLook};
 use super::simulate::{Material, Target, check_material};
 use schemars::JsonSchema;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Deserializer};
 use std::path::PathBuf;
 
 /// Most points of a hair: a hundred turns of a curl with forty points each.
@@ -40,93 +41,6 @@ pub struct GroomFile {
     pub layer: Vec<Layer>,
 }
 
-/// Control hairs: where they stand and what they are before combing.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Control {
-    /// Where they stand, besides one at every vertex of every chart's border, those along lines and those one by one.
-    #[serde(default)]
-    pub placement: Placement,
-    /// Hairs along lines on the skin.
-    #[serde(default)]
-    pub line: Vec<ControlLine>,
-    /// Hairs one by one.
-    #[serde(default)]
-    pub hair: Vec<ControlHair>,
-    /// Points of a control hair, the root included. Default: 4.
-    #[serde(default = "four")]
-    pub points: usize,
-    /// Length before combing, scene units. Default: the longest value among the layers, without its map.
-    pub length: Option<Feature>,
-    /// Push hairs that enter the skin back out after combing. Default: true.
-    #[serde(default = "yes")]
-    pub push_up: bool,
-    /// Distance from the skin that pushed hairs keep, millimetres. Default: 0.5.
-    #[serde(default = "half")]
-    pub clearance: f64,
-}
-
-fn four() -> usize {
-    4
-}
-
-fn yes() -> bool {
-    true
-}
-
-fn half() -> f64 {
-    0.5
-}
-
-/// Control hairs along a line on the skin.
-#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ControlLine {
-    /// The line, on or near the rest skin, scene units.
-    #[serde(deserialize_with = "points")]
-    pub points: Vec<[f64; 3]>,
-    /// Hairs at equal steps along it on the skin, the first and the last at its ends.
-    pub count: usize,
-}
-
-/// A control hair by itself.
-#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ControlHair {
-    /// Name, unique: for combing, and for layers of such hairs.
-    pub name: String,
-    /// Its root, on or near the rest skin, scene units.
-    #[serde(deserialize_with = "exactly")]
-    pub root: [f64; 3],
-    /// Its points after the root, at the rest pose, scene units. Default: straight up, as long as the others.
-    #[serde(default, deserialize_with = "some_points")]
-    pub points: Option<Vec<[f64; 3]>>,
-}
-
-/// True if `name` is one of `patterns`, which may end in `*`.
-pub fn is_named(name: &str, patterns: &[String]) -> bool {
-    patterns.iter().any(|p| p.strip_suffix('*').map_or(p == name, |start| name.starts_with(start)))
-}
-
-/// Where control hairs stand: one of the three, or none if there are others.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Placement {
-    /// Control hairs per square centimetre of skin.
-    pub per_cm2: Option<f64>,
-    /// Counts along u and along v, on every chart.
-    #[serde(default, deserialize_with = "grid")]
-    pub grid: Option<[usize; 2]>,
-    /// grid: equal steps along the skin instead of equal steps of u and v. Default: false.
-    #[serde(default)]
-    pub even: bool,
-    /// Curves drawn elsewhere (USD, PLY or .hair), bound to the skin.
-    pub curves: Option<PathBuf>,
-    /// per_cm2, grid: rounds in which hairs push each other apart; 30 even them out. Default: 0.
-    #[serde(default)]
-    pub relax: usize,
-}
-
 /// A line on the skin across which no hair mixes control hairs.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -136,10 +50,6 @@ pub struct Parting {
     /// Points on or near the rest skin, scene units, in order.
     #[serde(deserialize_with = "points")]
     pub points: Vec<[f64; 3]>,
-}
-
-fn grid<'de, D: Deserializer<'de>>(d: D) -> Result<Option<[usize; 2]>, D::Error> {
-    exactly(d).map(Some)
 }
 
 pub(super) fn points<'de, D: Deserializer<'de>>(d: D) -> Result<Vec<[f64; 3]>, D::Error> {
@@ -479,58 +389,6 @@ impl Document<GroomFile> {
         Ok(())
     }
 
-    fn check_control(&self) -> Result<(), ConfigError> {
-        let c = &self.value.control;
-        let p = &c.placement;
-        let given = [p.per_cm2.is_some(), p.grid.is_some(), p.curves.is_some()];
-        let count = given.iter().filter(|g| **g).count();
-        if count > 1 || count == 0 && c.line.is_empty() && c.hair.is_empty() {
-            let help = "give one of per_cm2, grid, curves, or add a [[control.line]] or a [[control.hair]]";
-            return Err(self.error("control.placement", "does not say where control hairs stand", help));
-        }
-        self.keys(
-            "control.placement",
-            &[
-                ("even", p.even, p.even && p.grid.is_some()),
-                ("relax", p.relax > 0, p.relax > 0 && p.curves.is_none() && count > 0),
-            ],
-        )?;
-        if p.relax > 10_000 {
-            return Err(self.error("control.placement.relax", "is out of range", "rounds go from 0 to 10000"));
-        }
-        for (i, l) in c.line.iter().enumerate() {
-            let at = format!("control.line[{i}]");
-            self.line(&format!("{at}.points"), Some(&l.points))?;
-            if !(1..=100_000).contains(&l.count) {
-                return Err(self.error(&format!("{at}.count"), "is out of range", "counts go from 1 to 100000"));
-            }
-        }
-        for (i, h) in c.hair.iter().enumerate() {
-            let at = format!("control.hair[{i}]");
-            if h.name.is_empty() || h.name.contains('*') || c.hair[..i].iter().any(|o| o.name == h.name) {
-                let help = "name every hair differently, without *";
-                return Err(self.error(&format!("{at}.name"), "is empty, used twice or a pattern", help));
-            }
-            let line: Vec<[f64; 3]> = [h.root].into_iter().chain(h.points.iter().flatten().copied()).collect();
-            match h.points {
-                Some(_) => self.line(&format!("{at}.points"), Some(&line))?,
-                None => h.root.into_iter().try_for_each(|x| self.within(&format!("{at}.root"), x, -1e9, 1e9))?,
-            }
-        }
-        if let Some(d) = p.per_cm2 {
-            self.within("control.placement.per_cm2", d, 0.0, 1e4)?;
-        }
-        if let Some(g) = p.grid.filter(|g| g.iter().any(|n| !(1..=4096).contains(n))) {
-            let what = format!("{} x {} is out of range", g[0], g[1]);
-            return Err(self.error("control.placement.grid", what, "counts go from 1 to 4096"));
-        }
-        self.points("control.points", Some(c.points))?;
-        if let Some(f) = &c.length {
-            self.feature("control.length", f, 1e6)?;
-        }
-        self.within("control.clearance", c.clearance, 0.0, 1e3)
-    }
-
     fn check_layer(&self, key: &str, l: &Layer) -> Result<(), ConfigError> {
         let by_hand = !l.hairs.is_empty();
         let said = |f: &Feature| f.value != UNSAID;
@@ -609,12 +467,12 @@ impl Document<GroomFile> {
         ))
     }
 
-    fn feature(&self, key: &str, f: &Feature, max: f64) -> Result<(), ConfigError> {
+    pub(super) fn feature(&self, key: &str, f: &Feature, max: f64) -> Result<(), ConfigError> {
         self.within(&format!("{key}.value"), f.value, 0.0, max)?;
         self.within(&format!("{key}.noise"), f.noise, 0.0, 1.0)
     }
 
-    fn points(&self, key: &str, points: Option<usize>) -> Result<(), ConfigError> {
+    pub(super) fn points(&self, key: &str, points: Option<usize>) -> Result<(), ConfigError> {
         match points {
             Some(n) if !(2..=MOST_POINTS).contains(&n) => {
                 Err(self.error(key, format!("must be between 2 and {MOST_POINTS}"), "8 to 16 is usual"))

@@ -2,7 +2,7 @@
 //!
 //! All files lie one behind the other in one space of byte offsets, so that the span of a value says its file too.
 
-use super::document::{ConfigError, nearest, tidy};
+use super::document::{ConfigError, first_line, nearest, tidy};
 use miette::{NamedSource, SourceSpan};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -12,6 +12,9 @@ use toml::de::{DeTable, DeValue};
 
 /// Styles that every groom file may be like.
 const PRESETS: &str = include_str!("presets.toml");
+
+/// Their number among the parts of a joined file.
+const PRESET: usize = 1;
 
 /// Keys whose text is a path.
 const PATHS: [&str; 3] = ["map", "file", "curves"];
@@ -64,16 +67,15 @@ impl Source {
 
     /// The files that a person writes, the one that includes the others first.
     pub fn files(&self) -> impl Iterator<Item = (&Path, &str)> {
-        // The presets come last.
-        let own = self.part.len() - usize::from(self.joins);
-        self.part[..own].iter().map(|p| (p.path.as_path(), p.text()))
+        let own = self.part.iter().enumerate().filter(|(k, _)| !self.is_preset(*k));
+        own.map(|(_, p)| (p.path.as_path(), p.text()))
     }
 
     /// A text with all that it includes, and the presets.
     pub fn joined(path: &Path, text: String) -> Result<Self, ConfigError> {
         let mut out = Source { joins: true, ..Source::plain(path, text) };
-        out.include(0, &mut vec![tidy(path)])?;
         out.add(Path::new("presets"), PRESETS.to_owned(), PathBuf::new());
+        out.include(0, &mut vec![tidy(path)])?;
         Ok(out)
     }
 
@@ -98,7 +100,7 @@ impl Source {
                 let what = format!("include: {} includes itself", path.display());
                 return Err(self.complaint(flaw(what, "take it out of one of the two")));
             }
-            let known = self.part.iter().position(|p| tidy(&p.path) == path);
+            let known = (0..self.part.len()).find(|k| !self.is_preset(*k) && tidy(&self.part[*k].path) == path);
             let number = match known {
                 Some(number) => number,
                 None => {
@@ -117,6 +119,10 @@ impl Source {
             self.part[k].includes.push(number);
         }
         Ok(())
+    }
+
+    fn is_preset(&self, k: usize) -> bool {
+        self.joins && k == PRESET
     }
 
     /// The number of the file where a byte lies.
@@ -149,9 +155,9 @@ impl Source {
 
     /// A complaint about a place.
     pub fn error(&self, span: Option<Range<usize>>, what: String, help: String) -> ConfigError {
-        let part = &self.part[self.part_at(span.as_ref().map_or(0, |s| s.start))];
-        let preset = self.joins && part.text() == PRESETS;
-        let help = if preset && help.is_empty() {
+        let k = self.part_at(span.as_ref().map_or(0, |s| s.start));
+        let part = &self.part[k];
+        let help = if self.is_preset(k) && help.is_empty() {
             "a table that is `like` this preset has no such key".to_owned()
         } else {
             help
@@ -172,10 +178,7 @@ impl Source {
     }
 
     fn parsed(&self, k: usize) -> Result<Spanned<DeTable<'_>>, ConfigError> {
-        DeTable::parse(&self.part[k].padded).map_err(|e| {
-            let what = e.message().lines().collect::<Vec<_>>().join("; ");
-            self.error(e.span(), what, String::new())
-        })
+        DeTable::parse(&self.part[k].padded).map_err(|e| self.error(e.span(), first_line(e.message()), String::new()))
     }
 
     /// All files as one.
@@ -186,9 +189,9 @@ impl Source {
         }
         let span = first.span();
         let mut once = vec![false; self.part.len()];
-        let mut root = self.merged(0, &mut once)?;
+        let mut root = self.merged(0, first.into_inner(), &mut once)?;
         let mut styles = Styles::default();
-        let mut presets = self.parsed(self.part.len() - 1)?.into_inner();
+        let mut presets = self.parsed(PRESET)?.into_inner();
         for named in [&mut root, &mut presets].into_iter().filter_map(|t| t.remove("style")) {
             let at = named.span();
             let DeValue::Table(named) = named.into_inner() else {
@@ -206,15 +209,14 @@ impl Source {
     }
 
     /// A file on top of what it includes; each counts once.
-    fn merged(&self, k: usize, once: &mut [bool]) -> Result<DeTable<'_>, ConfigError> {
+    fn merged<'a>(&'a self, k: usize, mut own: DeTable<'a>, once: &mut [bool]) -> Result<DeTable<'a>, ConfigError> {
         once[k] = true;
-        let mut own = self.parsed(k)?.into_inner();
         own.remove("include");
         own.iter_mut().for_each(|(_, v)| relocate(v.get_mut(), &self.part[k].folder));
         let mut out = DeTable::new();
         for &part in &self.part[k].includes {
             if !once[part] {
-                merge(&mut out, self.merged(part, once)?);
+                merge(&mut out, self.merged(part, self.parsed(part)?.into_inner(), once)?);
             }
         }
         merge(&mut out, own);

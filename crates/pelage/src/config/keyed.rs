@@ -1,7 +1,7 @@
 //! Values of a shot that may have key frames.
 
 use super::UpAxis;
-use super::document::exactly;
+use super::document::{ConfigError, Document, exactly};
 use pelage_geom::motion::between;
 use schemars::JsonSchema;
 use serde::de::value::MapAccessDeserializer;
@@ -57,6 +57,16 @@ impl<T> Keyed<T> {
     /// True if there are keys, each after the one before.
     pub fn in_order(&self) -> bool {
         !self.0.is_empty() && self.0.windows(2).all(|k| k[0].frame < k[1].frame)
+    }
+}
+
+impl<T> Document<T> {
+    /// Complains about key frames that are not each after the one before.
+    pub(super) fn check_keys<V>(&self, at: &str, keyed: &Keyed<V>) -> Result<(), ConfigError> {
+        if keyed.in_order() && keyed.0.iter().all(|k| k.frame.is_finite()) {
+            return Ok(());
+        }
+        Err(self.error(at, "key frames are not in order", "write one or more, each after the one before"))
     }
 }
 

@@ -194,11 +194,4 @@ impl Document<ShotFile> {
         }
         Ok(())
     }
-
-    pub(super) fn check_keys<T>(&self, at: &str, keyed: &Keyed<T>) -> Result<(), ConfigError> {
-        if keyed.in_order() && keyed.0.iter().all(|k| k.frame.is_finite()) {
-            return Ok(());
-        }
-        Err(self.error(at, "key frames are not in order", "write one or more, each after the one before"))
-    }
 }

@@ -2,6 +2,7 @@
 //! `[[layer.noise]]`, `[layer.wind]`, `[layer.collision]` and `[[emitter]]` of the groom file.
 
 use super::document::{Fixed, exactly, some_exactly};
+use super::groom::some_points;
 use super::keyed::{Keyed, Vector};
 use super::look_value::{LookValue, Varied, VariedValue, varied};
 use super::{Layer, MapRef};
@@ -10,11 +11,11 @@ use serde::de::Deserializer;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-fn zero() -> LookValue {
+pub(super) fn zero() -> LookValue {
     LookValue::constant(0.0)
 }
 
-fn one() -> LookValue {
+pub(super) fn one() -> LookValue {
     LookValue::constant(1.0)
 }
 
@@ -87,10 +88,6 @@ pub struct Clump {
 
 fn percent() -> LookValue {
     LookValue::constant(0.7)
-}
-
-fn some_points<'de, D: Deserializer<'de>>(d: D) -> Result<Option<Vec<[f64; 3]>>, D::Error> {
-    Ok(Some(Vec::<Fixed<f64, 3>>::deserialize(d)?.into_iter().map(|p| p.0).collect()))
 }
 
 /// Lines of points.

@@ -20,13 +20,11 @@ impl Document<GroomFile> {
                 return Err(self.error(&format!("{at}.curl.per_clump"), "the layer has no clumps", help));
             }
         }
-        if l.in_clusters && self.value.cluster.is_empty() {
-            return Err(self.error(&format!("{at}.in_clusters"), "there are no clusters", "add a [[cluster]]"));
+        if l.in_clusters {
+            self.needs_clusters(&format!("{at}.in_clusters"))?;
         }
         if let Some(c) = &l.cluster {
-            if self.value.cluster.is_empty() {
-                return Err(self.error(&format!("{at}.cluster"), "there are no clusters", "add a [[cluster]]"));
-            }
+            self.needs_clusters(&format!("{at}.cluster"))?;
             self.within(&format!("{at}.cluster.start"), c.start, 1e-3, 1.0)?;
             if c.simulate {
                 self.check_rest_shape(&format!("{at}.cluster"), &[varied("percent", &c.percent, [0.0, 1.0])])?;
@@ -77,9 +75,7 @@ impl Document<GroomFile> {
             self.within(at, k.value, v.range[0], v.range[1])?;
             self.within(at, k.frame, -1e9, 1e9)?;
         }
-        if !v.value.0.value.in_order() {
-            return Err(self.error(at, "key frames are not in order", "write one or more, each after the one before"));
-        }
+        self.check_keys(at, &v.value.0.value)?;
         self.within(&format!("{at}.noise"), v.value.0.noise, 0.0, if v.added { 1e3 } else { 1.0 })?;
         for s in &v.value.0.vary {
             self.within(&format!("{at}.vary"), s.size, 1e-9, 1e9)?;
@@ -110,8 +106,8 @@ impl Document<GroomFile> {
                 "give one of density, regions, roots, curves, clusters",
             ));
         }
-        if c.clusters.is_some() && self.value.cluster.is_empty() {
-            return Err(self.error(&format!("{at}.clusters"), "there are no clusters", "add a [[cluster]]"));
+        if c.clusters.is_some() {
+            self.needs_clusters(&format!("{at}.clusters"))?;
         }
         if c.clusters.is_some() && c.size.is_some() {
             return Err(self.error(&format!("{at}.size"), "is not read beside clusters", "take it out"));

@@ -66,11 +66,6 @@ impl LookValue {
         self.0.value.at(frame)
     }
 
-    /// It at a frame number: without key frames.
-    pub fn still(&self, frame: f64) -> Self {
-        LookValue(VariedValue { value: Keyed::constant(self.at(frame)), ..self.0.clone() })
-    }
-
     /// Its map.
     pub fn map(&self) -> Option<MapRef> {
         self.0.map.clone().map(|map| MapRef { map, channel: self.0.channel, wrap: self.0.wrap })

@@ -2,6 +2,7 @@
 
 mod cluster;
 mod comb;
+mod control;
 mod document;
 mod groom;
 mod guides;
@@ -18,11 +19,9 @@ mod skip;
 
 pub use cluster::{Cluster, ClusterEdit, ClusterEditKind, ClusterLook, MOST_CLUSTERS, Scalp};
 pub use comb::{Comb, CombKind, JointTurn, KeyLength, Side, Space};
+pub use control::{Control, ControlHair, ControlLine, Placement};
 pub use document::{ConfigError, Document};
-pub use groom::{
-    Channel, ColorFeature, Control, ControlHair, ControlLine, Feature, GroomFile, Guard, GuideChoice, Layer,
-    MOST_POINTS, MapRef, Parting, Placement, is_named,
-};
+pub use groom::{Channel, ColorFeature, Feature, GroomFile, Guard, GuideChoice, Layer, MOST_POINTS, MapRef, Parting};
 pub use groom::{WidthFeature, WrapMode};
 pub use guides::{Ball, Element, ElementKind, Falloff, Orientation, Panels, Plane, Primitive, Region, Shear};
 pub use keyed::{Amount, Key, Keyed, Vector};
@@ -40,9 +39,11 @@ pub use skip::Skip;
 
 /// JSON Schema (draft 2020-12) of a shot file or a groom file, for editors.
 pub fn schema<T: schemars::JsonSchema>() -> String {
-    let mut text = serde_json::to_string_pretty(&schemars::schema_for!(T)).expect("a schema is plain JSON");
-    text.push('\n');
-    text
+    pretty(&schemars::schema_for!(T))
+}
+
+fn pretty(schema: &impl serde::Serialize) -> String {
+    serde_json::to_string_pretty(schema).expect("a schema is plain JSON") + "\n"
 }
 
 /// JSON Schema of groom files as they are written: any may `include` others, any table may be `like` styles, and what is
@@ -70,7 +71,7 @@ pub fn groom_schema() -> String {
             "include".to_owned(),
             serde_json::json!({
                 "description": "Groom files that this one is put on top of, each relative to the file that names it.",
-                "anyOf": [{ "type": "string" }, { "type": "array", "items": { "type": "string" } }]
+                "anyOf": names["anyOf"]
             }),
         );
         properties.insert(
@@ -81,7 +82,5 @@ pub fn groom_schema() -> String {
             }),
         );
     }
-    let mut text = serde_json::to_string_pretty(&root).expect("a schema is plain JSON");
-    text.push('\n');
-    text
+    pretty(&root)
 }

@@ -8,6 +8,7 @@ use crate::Error;
 use crate::config::{Clump, LookValue, MapRef};
 use crate::format::ply::Column;
 use pelage_geom::{NONE, Vec3, rng};
+use pelage_groom::cluster::middles;
 use pelage_groom::field::Region;
 use pelage_groom::instance::Roots;
 use pelage_groom::look::member::{
@@ -223,7 +224,7 @@ fn in_clusters(run: &mut Runner<'_>, level: usize, roots: &Roots, open: &[bool])
     let (tree, uv) = (clusters::tree(run)?, clusters::coordinates(run, &roots.root)?);
     let mut of = clusters::owners(&tree, &uv, Some(level));
     of.iter_mut().zip(open).filter(|(_, open)| !**open).for_each(|(k, _)| *k = NONE);
-    let middle = clusters::middles(&tree, &of, &uv);
+    let middle = middles(&tree, &of, &uv);
     let mut number = vec![NONE; middle.len()];
     let mut found = Members::default();
     for (k, h) in middle.iter().enumerate().filter(|(_, h)| **h != NONE) {

@@ -2,19 +2,20 @@
 
 use super::What;
 use super::clumps::column;
-use super::groom::{partings, place_hairs, skin, view};
+use super::groom::{CONTROL_SEED, partings, place_hairs, skin, view};
 use super::guides;
 use super::run::{Counts, Runner};
 use super::skin::Texel;
 use super::tables::{self, decode, encode, root_columns, roots_of, table, vector_columns, vectors_of};
 use crate::Error;
-use crate::config::{Comb, CombKind as Kind, LookValue, Side, Space, is_named};
+use crate::config::{Comb, CombKind as Kind, LookValue, Side, Space};
 use crate::format::ply;
 use pelage_geom::{Bvh, TiledMap, Topology, Vec3};
 use pelage_groom::comb::{Amount, CombKind, CombOp, DirectionSpace, Guides, Handle, comb};
 use pelage_groom::control::ControlHairs;
 use pelage_groom::field::lengths::Shear;
 use pelage_groom::flow::trace::{Guard, Start};
+use pelage_groom::look::member::rest_sites;
 use pelage_groom::look::vary::Drawn;
 use pelage_groom::push_up::{PushUp, push_up};
 use std::collections::BTreeMap;
@@ -51,15 +52,22 @@ fn hairs(run: &mut Runner<'_>, what: What) -> Result<ControlHairs, Error> {
 }
 
 fn comb_hairs(run: &mut Runner<'_>, what: What) -> Result<ControlHairs, Error> {
-    let mut hairs = match run.placed.take() {
+    let mut hairs = match run.placed.clone() {
         Some(hairs) => hairs,
-        None => place_hairs(run)?.0,
+        None => {
+            let placed = place_hairs(run)?.0;
+            run.placed.insert(placed).clone()
+        }
     };
     let skin = skin(run)?;
     let project = run.project;
     let combs = project.combs(what.comb_frame());
     let lines = partings(run);
-    let read = combs.iter().enumerate().map(|(i, c)| Read::new(run, i, c, &hairs)).collect::<Result<Vec<_>, _>>()?;
+    let id: Vec<u64> = (0..hairs.len() as u64).collect();
+    let uv: Vec<[f32; 2]> = hairs.root.iter().map(|p| view(&skin).uv(p)).collect();
+    let (position, _) = rest_sites(&view(&skin), &hairs.root, skin.origin());
+    let drawn = Drawn { id: &id, uv: &uv, position: &position, seed: CONTROL_SEED };
+    let read = combs.iter().enumerate().map(|(i, c)| Read::new(run, i, c, &drawn)).collect::<Result<Vec<_>, _>>()?;
     let control = &project.groom.value.control;
     let millimetre = 1e-3 / project.shot.value.shot.meters_per_unit;
     let clearance = control.clearance * millimetre;
@@ -110,32 +118,18 @@ struct Read {
 }
 
 impl Read {
-    fn new(run: &mut Runner<'_>, i: usize, c: &Comb, hairs: &ControlHairs) -> Result<Read, Error> {
+    fn new(run: &mut Runner<'_>, i: usize, c: &Comb, hairs: &Drawn<'_>) -> Result<Read, Error> {
         let texel = if c.kind == Kind::DirectionMap { Texel::Direction } else { Texel::Value };
-        let skin = skin(run)?;
-        let id: Vec<u64> = (0..hairs.len() as u64).collect();
-        let uv: Vec<[f32; 2]> = hairs.root.iter().map(|p| view(&skin).uv(p)).collect();
-        let at = |p| {
-            let p = skin.mesh.point(p);
-            [p.x as f32, p.y as f32, p.z as f32]
-        };
-        let position: Vec<[f32; 3]> = hairs.root.iter().map(at).collect();
-        let drawn = Drawn { id: &id, uv: &uv, position: &position, seed: super::groom::CONTROL_SEED };
         let mut factor = BTreeMap::new();
         for (key, v) in c.varied() {
-            factor.insert(key, column(run, &drawn, &format!("comb[{i}].{key}"), v, false)?);
+            factor.insert(key, column(run, hairs, &format!("comb[{i}].{key}"), v, false)?);
         }
-        let named = run.project.groom.value.control.hair.iter().enumerate();
-        let only = c
-            .hairs
-            .as_ref()
-            .map(|names| named.filter(|(_, h)| is_named(&h.name, names)).map(|(k, _)| k as u32).collect());
         Ok(Read {
             region: c.region.as_ref().map(|m| run.map(m, Texel::Value)).transpose()?,
             map: c.map.as_ref().map(|m| run.map(m, texel)).transpose()?,
             shear: c.shear.as_ref().map(guides::shear),
             trim: run.project.trims.get(&i).map(|f| trimmer(&f.path)).transpose()?,
-            only,
+            only: c.hairs.as_ref().map(|names| run.project.groom.value.control.named(names)),
             factor,
         })
     }
@@ -190,9 +184,9 @@ fn operation<'a>(run: &Runner<'_>, c: &Comb, read: &'a Read, guides: Option<Guid
         Kind::Trim => CombKind::Trim { surface: read.trim.as_ref().expect("checked: a trim has its mesh") },
         Kind::Length => CombKind::Length { value: read.amount("value", c.value.as_ref(), 1.0), map },
         Kind::Chain => {
-            let named = |n: &String| run.project.groom.value.control.hair.iter().position(|h| h.name == *n);
-            let handle = match c.hair.as_ref().and_then(named) {
-                Some(k) => Handle::Single(k as u32),
+            let control = &run.project.groom.value.control;
+            let handle = match c.hair.as_ref().and_then(|n| control.named(std::slice::from_ref(n)).first().copied()) {
+                Some(k) => Handle::Single(k),
                 None => Handle::Nearest(c.at.unwrap_or_default().into()),
             };
             CombKind::Chain {

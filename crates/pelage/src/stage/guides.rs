@@ -13,7 +13,7 @@ use crate::config::{
 use crate::format::ply::{self, Column};
 use nalgebra::UnitQuaternion;
 use pelage_geom::{Bvh, Mesh, Pose, TiledMap, Vec3};
-use pelage_groom::cluster::Tree;
+use pelage_groom::cluster::{Tree, lines};
 use pelage_groom::control::ControlHairs;
 use pelage_groom::field::{self, Falloff, GuideField, lengths};
 use pelage_groom::flow::trace::{Guard, Lines, Start, Trace, trace};
@@ -82,7 +82,8 @@ impl Guides {
             Guides::Clusters(c) => {
                 // A control hair stands for hair of any length: it takes the shape of the whole cluster.
                 let root: Vec<Vec3> = starts.iter().map(|s| s.at).collect();
-                clusters::lines(&c.tree, &c.of, &c.uv, &root, None, points, START).expect("the tree was checked")
+                let at = lines(&c.tree, &c.of, &c.uv, &root, None, points, START).expect("the tree was checked");
+                Lines { points, at, straight_from: vec![points as u32; root.len()] }
             }
             Guides::Flow(f) => f.lines(&Trace { reverse: f.reverse, ..settings }, guard, starts, longest),
         }

@@ -6,11 +6,12 @@ use super::skin::Texel;
 use super::tables::{decode, encode, id_columns, ids_of, root_columns, roots_of, table, vector_columns, vectors_of};
 use super::{Skin, What, candidate_density, clusters, comb, groom, guides, kept, layer_seed};
 use crate::Error;
-use crate::config::{Feature, Guard, GuideChoice, is_named};
+use crate::config::{Feature, Guard, GuideChoice};
 use crate::format::ply::Column;
-use pelage_geom::{SurfacePoint, TiledMap, rng};
+use pelage_geom::{StrandId, SurfacePoint, TiledMap, rng};
 use pelage_groom::candidates::{Candidates, candidates as find_candidates, strand_id};
 use pelage_groom::choose::{self, respect};
+use pelage_groom::control::ControlHairs;
 use pelage_groom::instance::{Density, Feature as FeatureSource, Roots, colour_column, feature_column, scale_guards};
 use pelage_groom::instance::{roots as find_roots, weights as find_weights};
 use pelage_groom::keep::kept as kept_roots;
@@ -118,35 +119,38 @@ pub(super) fn density(run: &mut Runner<'_>, i: usize) -> Result<LayerDensity, Er
     Ok(LayerDensity { value: layer.density.value * run.project.cm2_per_unit2(), map, on_off })
 }
 
-/// Control hairs that are the hairs of a layer, in the order of the file; empty for a layer of a density.
-fn by_hand(run: &mut Runner<'_>, i: usize) -> Result<Vec<u32>, Error> {
-    let groom = &run.project.groom.value;
-    let wanted = &groom.layer[i].hairs;
-    if wanted.is_empty() {
-        return Ok(Vec::new());
-    }
-    let hairs = comb::combed(run)?;
-    let mut found: Vec<(u32, u32)> = hairs.single.iter().enumerate().map(|(h, s)| (*s, h as u32)).collect();
-    found.retain(|(s, _)| groom.control.hair.get(*s as usize).is_some_and(|h| is_named(&h.name, wanted)));
-    found.sort_unstable();
-    Ok(found.into_iter().map(|f| f.1).collect())
+/// True if a layer consists of control hairs placed one by one.
+fn is_by_hand(run: &Runner<'_>, i: usize) -> bool {
+    !run.project.groom.value.layer[i].hairs.is_empty()
 }
 
-/// Roots of such a layer; a hair is named by its place among the control hairs of the file.
+/// The control hair that a hair of such a layer is: its id ends in the number of that among those placed one by one.
+fn by_hand(control: &ControlHairs, id: StrandId) -> usize {
+    control.placed_alone(id as u32).expect("hairs of the layer are control hairs")
+}
+
+/// Roots of such a layer, in the order of the file.
 fn roots_by_hand(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
-    let (skin, hairs, found) = (groom::skin(run)?, comb::combed(run)?, by_hand(run, i)?);
-    let seed = layer_seed(&run.project.groom.value.layer[i].name);
-    let of = |h: &u32| hairs.root[*h as usize];
+    let (skin, control) = (groom::skin(run)?, comb::combed(run)?);
+    let groom = &run.project.groom.value;
+    let seed = layer_seed(&groom.layer[i].name);
+    let named = groom.control.named(&groom.layer[i].hairs);
+    let id: Vec<StrandId> = named
+        .into_iter()
+        .filter(|single| control.placed_alone(*single).is_some())
+        .map(|single| strand_id(seed, single))
+        .collect();
+    let root: Vec<SurfacePoint> = id.iter().map(|id| control.root[by_hand(&control, *id)]).collect();
     Ok(Roots {
-        root: found.iter().map(of).collect(),
-        uv: found.iter().map(|h| groom::view(&skin).uv(&of(h))).collect(),
-        chart: found.iter().map(|h| skin.topology.chart[of(h).triangle as usize]).collect(),
-        id: found.iter().map(|h| strand_id(seed, hairs.single[*h as usize])).collect(),
+        uv: root.iter().map(|p| groom::view(&skin).uv(p)).collect(),
+        chart: root.iter().map(|p| skin.topology.chart[p.triangle as usize]).collect(),
+        root,
+        id,
     })
 }
 
 fn grow(run: &mut Runner<'_>, i: usize) -> Result<Roots, Error> {
-    if !run.project.groom.value.layer[i].hairs.is_empty() {
+    if is_by_hand(run, i) {
         let found = roots_by_hand(run, i)?;
         return kept_roots_of(run, i, found);
     }
@@ -223,14 +227,11 @@ pub fn weights(run: &mut Runner<'_>, i: usize) -> Result<Weights, Error> {
     if let Some(found) = run.fetch(what).and_then(|e| decode_weights(e.payload.first()?)) {
         return Ok(found);
     }
-    let own = by_hand(run, i)?;
-    if !own.is_empty() {
-        // Hairs may have been left out.
+    if is_by_hand(run, i) {
         let (control, roots) = (comb::combed(run)?, roots(run, i)?);
-        let place = |id: &u64| own.iter().position(|h| u64::from(control.single[*h as usize]) == id & 0xffff_ffff);
-        let hair =
-            roots.id.iter().map(|id| [own[place(id).expect("hairs of the layer are control hairs")]; 3]).collect();
-        return keep_weights(run, what, Counts::new(), hair, vec![[1.0, 0.0, 0.0]; roots.id.len()]);
+        let hair: Vec<[u32; 3]> = roots.id.iter().map(|id| [by_hand(&control, *id) as u32; 3]).collect();
+        let weight = vec![[1.0, 0.0, 0.0]; hair.len()];
+        return keep_weights(run, what, Counts::new(), hair, weight);
     }
     let skin = groom::skin(run)?;
     let sites = groom::placed(run)?;
@@ -337,12 +338,10 @@ pub(super) fn feature(run: &mut Runner<'_>, what: What, i: usize, roots: &Roots)
     };
     let seed = u64::from(layer_seed(&layer.name));
     let mut values = feature_column(roots, &source, seed);
-    if name == "length" && !run.project.groom.value.layer[i].hairs.is_empty() {
-        let (control, own) = (comb::combed(run)?, by_hand(run, i)?);
-        for (value, id) in values.iter_mut().zip(&roots.id) {
-            let hair = own.iter().find(|h| u64::from(control.single[**h as usize]) == id & 0xffff_ffff);
-            *value *= hair.map_or(0.0, |h| control.length(*h as usize)) as f32;
-        }
+    if name == "length" && is_by_hand(run, i) {
+        let control = comb::combed(run)?;
+        let own = |id: &StrandId| control.length(by_hand(&control, *id)) as f32;
+        values.iter_mut().zip(&roots.id).for_each(|(value, id)| *value *= own(id));
     }
     if let Some((share, factor)) = guard {
         scale_guards(&mut values, roots, share, factor, seed);

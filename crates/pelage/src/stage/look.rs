@@ -254,13 +254,13 @@ fn in_clusters(
     let (skin, tree, roots) = (groom::skin(run)?, clusters::tree(run)?, instance::roots(run, i)?);
     let uv = clusters::coordinates(run, &roots.root)?;
     let top = clusters::owners(&tree, &uv, Some(0));
-    let middle = clusters::middles(&tree, &top, &uv);
+    let middle = cluster::middles(&tree, &top, &uv);
     let of = clusters::owners(&tree, &uv, layer.level);
     let origin = Vec3::from(skin.origin());
     let at: Vec<Vec3> = roots.root.iter().map(|p| skin.mesh.point(p)).collect();
     let length: Vec<f64> = rest.chunks_exact(points).map(curve::length).collect();
     let wrong = |e: String| run.project.groom.error(&format!("layer[{i}].cluster"), e, "");
-    let lines = clusters::lines(&tree, &of, &uv, &at, Some(&length), points, layer.start).map_err(wrong)?;
+    let lines = cluster::lines(&tree, &of, &uv, &at, Some(&length), points, layer.start).map_err(wrong)?;
     let mut hair: Vec<u32> = (0..of.len() as u32).filter(|h| of[*h as usize] != NONE).collect();
     // Hairs of one carrier side by side.
     hair.sort_by_key(|h| (top[*h as usize], *h));
@@ -269,13 +269,11 @@ fn in_clusters(
         let p = p - origin;
         [p.x as f32, p.y as f32, p.z as f32]
     };
-    let line: Vec<[f32; 3]> = hair.iter().flat_map(|h| lines.line(*h as usize).iter().map(single)).collect();
+    let line: Vec<[f32; 3]> =
+        hair.iter().flat_map(|h| lines[*h as usize * points..][..points].iter().map(single)).collect();
     let now = carried(&skin.mesh, &skin.topology, &skin.rest, &roots.root, axes);
     let local = bind_lines(points, rest, &carrier, &now, &line);
-    let fade = |k: usize| {
-        let x = (k as f64 / (points - 1) as f64 / layer.start).min(1.0);
-        (1.0 - x * x * (3.0 - 2.0 * x)) as f32
-    };
+    let fade = |k: usize| cluster::fade(k as f64 / (points - 1) as f64 / layer.start) as f32;
     Ok(InClusters { hair, carrier, local, rooted: (0..points).map(fade).collect() })
 }
 

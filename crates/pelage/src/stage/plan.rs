@@ -193,7 +193,7 @@ impl Plan {
             Target::Off if r.project.curves.is_some() => &[What::Curves, What::Rest(0)],
             Target::EveryHair => &[simulated],
             Target::ControlHairs => &[simulated, hairs_of(r.project, i), What::Weights(i), What::Length(i)],
-            Target::Off if r.project.combs_move() => {
+            Target::Off if r.combs_move => {
                 &[What::CombAt(frame), What::Comb, hairs_of(r.project, i), What::Weights(i), What::Length(i)]
             }
             Target::Off => &[What::Comb, hairs_of(r.project, i), What::Weights(i), What::Length(i)],
@@ -215,7 +215,7 @@ impl Plan {
             }
         }
         plan.add(What::Comb, "groom/comb".into(), Stage::Groom, r.comb(None), &reads);
-        if project.combs_move() {
+        if r.combs_move {
             for frame in project.frames.keys() {
                 let name = format!("groom/comb/{frame}");
                 plan.add(What::CombAt(*frame), name, Stage::Groom, r.comb(Some(*frame)), &reads);
@@ -353,11 +353,13 @@ impl ExportFormat {
 pub(super) struct Reader<'a> {
     pub project: &'a Project,
     shot: String,
+    /// True if combing has key frames.
+    combs_move: bool,
 }
 
 impl<'a> Reader<'a> {
     pub(super) fn new(project: &'a Project) -> Self {
-        Reader { project, shot: project.label(&project.shot.path) }
+        Reader { project, shot: project.label(&project.shot.path), combs_move: project.combs_move() }
     }
 
     pub(super) fn in_groom(&self, key: &str) -> String {
@@ -443,9 +445,7 @@ impl<'a> Reader<'a> {
         let at = self.in_groom(&format!("layer[{i}]"));
         let r =
             Recipe::new("instance/roots", version::ROOTS).param("seed", layer_seed(&layer.name), format!("{at}.name"));
-        let r = r.param("hairs", format!("{:?}", layer.hairs), format!("{at}.hairs"));
-        let names: Vec<&String> = self.project.groom.value.control.hair.iter().map(|h| &h.name).collect();
-        r.param("names", format!("{names:?}"), self.in_groom("control.hair"))
+        self.names(r.param("hairs", format!("{:?}", layer.hairs), format!("{at}.hairs")))
     }
 
     fn roots(&self, i: usize) -> Recipe {

@@ -3,6 +3,7 @@
 use super::plan::{Reader, version};
 use crate::cache::Recipe;
 use crate::config::{Comb, CombKind, Panels, Parting};
+use serde::Serialize;
 
 impl Reader<'_> {
     /// What placing control hairs reads.
@@ -23,15 +24,8 @@ impl Reader<'_> {
         if p.relax > 0 {
             r = r.param("relax", p.relax, format!("{at}.relax"));
         }
-        let more = [
-            ("control.line", serde_json::to_value(&control.line)),
-            ("control.hair", serde_json::to_value(&control.hair)),
-        ];
-        for (key, value) in more {
-            for (name, value) in leaves(key, &value.expect("plain numbers and names")) {
-                r = r.param(&name, value, self.in_groom(&name));
-            }
-        }
+        r = self.plain(r, "control.line", &control.line);
+        r = self.plain(r, "control.hair", &control.hair);
         if let Some(drawn) = &self.project.drawn {
             r = r.file("curves", &drawn.hash, drawn.label.clone());
         }
@@ -95,17 +89,20 @@ impl Reader<'_> {
     /// What clusters read.
     pub(super) fn clusters(&self, r: Recipe) -> Recipe {
         let groom = &self.project.groom.value;
-        let mut r = self.scalp(r);
-        let all = [
-            ("cluster", serde_json::to_value(&groom.cluster)),
-            ("cluster_edit", serde_json::to_value(&groom.cluster_edit)),
-        ];
-        for (key, value) in all {
-            for (name, value) in leaves(key, &value.expect("plain numbers and names")) {
-                r = r.param(&name, value, self.in_groom(&name));
-            }
-        }
-        r
+        let r = self.plain(self.scalp(r), "cluster", &groom.cluster);
+        self.plain(r, "cluster_edit", &groom.cluster_edit)
+    }
+
+    /// Numbers and names of a value, each with its key.
+    fn plain(&self, r: Recipe, key: &str, value: &impl Serialize) -> Recipe {
+        let value = serde_json::to_value(value).expect("plain numbers and names");
+        leaves(key, &value).into_iter().fold(r, |r, (name, value)| r.param(&name, value, self.in_groom(&name)))
+    }
+
+    /// Names of the hairs placed one by one, for what chooses among them.
+    pub(super) fn names(&self, r: Recipe) -> Recipe {
+        let names: Vec<&String> = self.project.groom.value.control.hair.iter().map(|h| &h.name).collect();
+        r.param("names", format!("{names:?}"), self.in_groom("control.hair"))
     }
 
     fn comb_fields(&self, mut r: Recipe, i: usize, c: &Comb) -> Recipe {
@@ -133,8 +130,7 @@ impl Reader<'_> {
             r = r.with(self.value(&name(key), &name(key), v, 0.0));
         }
         if c.hairs.is_some() || c.hair.is_some() {
-            let names: Vec<&String> = self.project.groom.value.control.hair.iter().map(|h| &h.name).collect();
-            r = r.param("names", format!("{names:?}"), self.in_groom("control.hair"));
+            r = self.names(r);
         }
         for (key, map) in [("region", &c.region), ("map", &c.map)] {
             r = r.with(map.iter().flat_map(|m| self.map(&name(key), m)));
@@ -147,27 +143,20 @@ impl Reader<'_> {
 
     /// What hairs follow.
     fn comb_guides(&self, mut r: Recipe, i: usize, c: &Comb) -> Recipe {
-        let guides = [
-            ("primitive", serde_json::to_value(&c.primitive)),
-            ("divider", serde_json::to_value(&c.divider)),
-            ("element", serde_json::to_value(&c.element)),
-            ("shear", serde_json::to_value(&c.shear)),
-            ("turn", serde_json::to_value(&c.turn)),
-            ("key", serde_json::to_value(&c.key)),
-            ("plane", serde_json::to_value(c.plane)),
-            ("scalp", serde_json::to_value(c.scalp)),
-        ];
-        for (key, value) in guides {
-            for (name, value) in leaves(&format!("comb[{i}].{key}"), &value.expect("plain numbers and names")) {
-                r = r.param(&name, value, self.in_groom(&name));
-            }
-        }
+        let at = |key: &str| format!("comb[{i}].{key}");
+        r = self.plain(r, &at("primitive"), &c.primitive);
+        r = self.plain(r, &at("divider"), &c.divider);
+        r = self.plain(r, &at("element"), &c.element);
+        r = self.plain(r, &at("shear"), &c.shear);
+        r = self.plain(r, &at("turn"), &c.turn);
+        r = self.plain(r, &at("key"), &c.key);
+        r = self.plain(r, &at("plane"), &c.plane);
+        r = self.plain(r, &at("scalp"), &c.scalp);
         if c.reverse {
-            let name = format!("comb[{i}].reverse");
-            r = r.param(&name, true, self.in_groom(&name));
+            r = r.param(&at("reverse"), true, self.in_groom(&at("reverse")));
         }
         if let Some(file) = self.project.trims.get(&i) {
-            r = r.file(&format!("comb[{i}].file"), &file.hash, file.label.clone());
+            r = r.file(&at("file"), &file.hash, file.label.clone());
         }
         let Some(panels) = &c.panels else { return r };
         let name = |key: &str| format!("comb[{i}].panels.{key}");
