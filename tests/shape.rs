@@ -1,7 +1,7 @@
 //! Control hairs shaped in every way: clusters, hairs one by one, chains, mirrors, key frames, dividers, skin of patches,
 //! grooms of several files.
 
-use pelage_tests::{ShotFolder, ascii_ply, exported_hairs, small_shot};
+use pelage_tests::{ShotFolder, ascii_ply, exported_hairs, grey_png, small_shot};
 use std::collections::BTreeMap;
 
 const COMMAND: &str = env!("CARGO_BIN_EXE_pelage-under-test");
@@ -256,7 +256,7 @@ fn chains_move_hair_and_its_neighbours() {
     assert!(after.keys().filter(moved).all(|k| apart(before[k][0], [0.0, 0.0, 5.0]) < 4.5), "the others stay");
     shot.edit(GROOM, "reach = [1.0, 0.0, 6.0]", "reach = [1.5, 0.0, 6.0]");
     let why = shot.plan(&[]).1;
-    assert_eq!(why.iter().collect::<Vec<_>>(), ["grooms/ball.toml: comb[0].reach [1, 0, 6] -> [1.5, 0, 6]"]);
+    assert_eq!(why.iter().collect::<Vec<_>>(), ["grooms/ball.toml: comb[0].reach [1.0, 0.0, 6.0] -> [1.5, 0.0, 6.0]"]);
 }
 
 #[test]
@@ -326,7 +326,87 @@ fn key_frames_move_control_hairs() {
     is_as_from_nothing(&shot);
     // Simulated hair could not follow.
     shot.edit(SHOT, "target = \"off\"", "target = \"every-hair\"");
-    refused(&shot, &["comb[0]", "key frames", "layer coat is simulated", "simulate = \"off\""]);
+    refused(&shot, &["comb[0].angle", "key frames", "layer coat is simulated", "simulate = \"off\""]);
+    let moving = KEYED[7].replace("<0.0|0.5>", "[{ frame = 1, value = 0.0 }, { frame = 3, value = 0.5 }]");
+    let still = moving.split('<').map(|p| {
+        p.split_once('>').map_or(p.to_owned(), |(k, rest)| k.split_once('|').expect("two values").0.to_owned() + rest)
+    });
+    let layer = "[[layer]]\nname = \"coat\"\ndensity = { value = 1.0 }\nlength = { value = 2.0 }\n[layer.";
+    let groom = still.collect::<String>().replace("[layer.", layer);
+    shot.write(GROOM, format!("[control]\nplacement = {{ per_cm2 = 1.0 }}\n{groom}\nsimulate = true\n"));
+    refused(&shot, &["cluster[0].twist", "key frames", "layer coat is simulated"]);
+}
+
+/// Combing and clusters with numbers `<at frame 1|at frame 3>`.
+const KEYED: [&str; 9] = [
+    "[[comb]]\nkind = \"direction-curve\"\npoints = <[[-6.0, 1.0, 0.0], [6.0, 1.0, 0.0]]|[[-6.0, 1.0, 0.0], [6.0, 9.0, 4.0]]>\n\
+     radius = <5.0|7.0>\nfalloff = 0.5",
+    "[[comb]]\nkind = \"bend\"\nangle = 60.0\nregion = { map = \"../maps/half.png\" }\n\
+     [[comb]]\nkind = \"mirror\"\nplane = { point = <[0.0, 0.0, 0.0]|[1.5, 0.0, 0.0]>, normal = <[1.0, 0.0, 0.0]|[1.0, 0.4, 0.0]> }",
+    "[[comb]]\nkind = \"cut\"\nshear = { at = { point = <[0.0, 5.5, 0.0]|[0.0, 3.0, 0.0]>, normal = [0.0, 1.0, 0.0] } }",
+    "[[comb]]\nkind = \"cut\"\nshear = { at = { point = [0.0, 4.0, 0.0], normal = [0.0, 1.0, 0.0] } }\n\
+     scalp = { centre = [0.0, 0.0, 0.0], radius = <5.0|3.0> }",
+    "[[comb]]\nkind = \"cut\"\nscalp = { centre = [0.0, 0.0, 0.0], radius = 5.0 }\n\
+     key = [{ at = [0.0, 5.0, 0.0], length = <1.0|0.5> }, { at = <[0.0, -5.0, 0.0]|[5.0, 0.0, 0.0]>, length = 1.8 }]",
+    "[[comb]]\nkind = \"field\"\n[[comb.primitive]]\norientation = \"along\"\n\
+     points = <[[0.0, 0.0, -9.0], [0.0, 0.0, 9.0]]|[[0.0, 0.0, -9.0], [9.0, 0.0, 9.0]]>\nshape = <[1.0, 1.0, 1.0]|[1.0, 3.0, 1.0]>\n\
+     falloff = { exponent = <2.0|0.5> }\ndomain = [{ centre = [0.0, 5.0, 0.0], radii = <[3.0, 3.0, 3.0]|[5.0, 3.0, 5.0]> }]\n\
+     [[comb.primitive]]\norientation = \"wave\"\ndirection = [0.0, 1.0, 0.0]\nsway = <[1.0, 0.0, 0.0]|[0.0, 0.0, 1.0]>\nwavelength = <2.0|1.0>",
+    "[[comb]]\nkind = \"flow\"\npanels = { most = 60, through = { value = <1.0|0.2> } }\n[[comb.element]]\nkind = \"filament\"\n\
+     points = <[[8.0, 0.0, -3.0], [8.0, 0.0, 3.0]]|[[8.0, 2.0, -3.0], [8.0, 0.0, 3.0]]>\nstrength = <3.0|9.0>\ncore = <0.1|1.0>",
+    "[scalp]\ncentre = [0.0, 0.0, 0.0]\nup = [0.0, 1.0, 0.0]\nfront = [0.0, 0.0, 1.0]\n\
+     [[cluster]]\nname = \"tail\"\nroot = [0.0, 5.0, 0.0]\nradius = 3.0\npoints = <[[0.0, 6.0, 0.0], [0.0, 8.0, 0.0]]|[[1.0, 6.0, 0.0], [2.0, 7.0, 3.0]]>\n\
+     width = <[3.0, 1.0]|[3.0, 2.0]>\ntwist = <0.0|0.5>\n\
+     [[cluster_edit]]\nkind = \"braid\"\nof = \"tail\"\nturns = <1.0|2.0>\nstart = <0.1|0.3>\n\
+     [[cluster_edit]]\nkind = \"scale\"\nof = \"tail/*\"\nwidth = <[1.0, 1.0]|[0.5, 0.2]>\n\
+     [layer.cluster]",
+    "[scalp]\ncentre = [0.0, 0.0, 0.0]\nup = [0.0, 1.0, 0.0]\nfront = [0.0, 0.0, 1.0]\n\
+     [[cluster]]\nname = \"tail\"\nroot = [0.0, 5.0, 0.0]\nradius = 3.0\npoints = <[[0.0, 6.0, 0.0], [0.0, 8.0, 0.0]]|[[1.0, 6.0, 0.0], [2.0, 7.0, 3.0]]>\n\
+     [[comb]]\nkind = \"cluster\"",
+];
+
+#[test]
+fn every_number_of_combing_and_clusters_may_have_key_frames() {
+    let maps = |shot: &ShotFolder| shot.write("maps/half.png", grey_png(2, 1, |x, _| if x == 0 { 255 } else { 0 }));
+    for (i, case) in KEYED.iter().enumerate() {
+        let layer = "[[layer]]\nname = \"coat\"\ndensity = { value = 1.0 }\nlength = { value = 9.0 }\n";
+        let control = "[control]\nplacement = { per_cm2 = 1.0 }\npoints = 6\n";
+        // What begins with a table of the layer comes after it.
+        let (before, after) =
+            case.split_once("[layer.").map_or((*case, String::new()), |(b, a)| (b, format!("[layer.{a}\n")));
+        let text = format!("{control}{before}\n{layer}{after}");
+        let said = |of: &dyn Fn(&str, &str) -> String| {
+            let each = |part: &str| match part.split_once('>') {
+                Some((keys, rest)) => {
+                    let (a, b) = keys.split_once('|').expect("two values");
+                    of(a, b) + rest
+                }
+                None => part.to_owned(),
+            };
+            text.split('<').map(each).collect::<String>()
+        };
+        let keyed = said(&|a, b| format!("[{{ frame = 1, value = {a} }}, {{ frame = 3, value = {b} }}]"));
+        let shot = groomed(&keyed);
+        maps(&shot);
+        shot.report(&[]);
+        let at: Vec<_> = (0..3).map(|f| positions(&shot, Some(f))).collect();
+        assert!(at[0] != at[1] && at[1] != at[2] && at[0] != at[2], "case {i} moves");
+        for (frame, value) in [(0, said(&|a, _| a.to_owned())), (2, said(&|_, b| b.to_owned()))] {
+            shot.write(GROOM, &value);
+            shot.report(&[]);
+            // Hair in clusters is bound to hair at rest, which is that of the first frame.
+            assert!(positions(&shot, Some(frame)) == at[frame], "case {i} at its key frame {frame}");
+        }
+        // Each number is told by its own key when it is edited.
+        shot.write(GROOM, &keyed);
+        shot.report(&[]);
+        let last = keyed.rfind("frame = 3").expect("a key frame");
+        shot.write(GROOM, format!("{}frame = 2{}", &keyed[..last], &keyed[last + 9..]));
+        let (run, why) = shot.plan(&[]);
+        let own = |key: &str| run.iter().any(|r| r.ends_with(key));
+        assert!(own("/2") && !own("/3") && !own("/1"), "case {i}: {run:?}");
+        assert_eq!(why.len(), 1, "{why:?}");
+    }
 }
 
 #[test]

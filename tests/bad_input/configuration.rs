@@ -391,6 +391,7 @@ fn clusters_chains_and_hairs_by_hand() {
     let cluster = "[[cluster]]\nname = \"a\"\nroot = [0.0, 5.0, 0.0]\nradius = 2.0\npoints = [[0.0, 9.0, 0.0]]\n";
     let used = "[[comb]]\nkind = \"cluster\"\n";
     let edit = |edit: &str| format!("{cluster}[[cluster_edit]]\n{edit}\n{used}");
+    let keyed = |angle: &str| format!("[[comb]]\nkind = \"bend\"\nangle = {angle}\n");
     let hair = "[[control.hair]]\nname = \"w\"\nroot = [0.0, 5.0, 0.0]\n";
     for (text, words) in [
         (cluster.replace("radius = 2.0\n", ""), "cluster[0]|one of `radius`, `outline`"),
@@ -436,6 +437,29 @@ fn clusters_chains_and_hairs_by_hand() {
             "comb[1].angle|not in order",
         ),
         ("[[comb]]\nkind = \"bend\"\nangle = { value = 1.0, map = \"none.png\" }\n".to_owned(), "angle.map|none.png"),
+        (keyed("[{ frame = 1, value = 1.0 }, { frame = 2, valeu = 0.0 }]"), "comb[1].angle|unknown field `valeu`"),
+        (keyed("[{ frame = 1, value = 1.0 }, { frame = 2 }]"), "comb[1].angle|missing field `value`"),
+        (keyed("[{ frame = 1, value = 1.0 }, 3.0]"), "comb[1].angle|no key frame"),
+        (keyed("[{ frame = [1], value = 1.0 }]"), "comb[1].angle|a frame is a number"),
+        (keyed("[{ frame = nan, value = 1.0 }]"), "comb[1].angle|finite numbers"),
+        (keyed("[{ frame = 1, value = true }]"), "comb[1].angle|key frames hold numbers"),
+        (keyed("[{ frame = 1, value = 1.0 }, { frame = 2, value = 1000.0 }]"), "comb[1].angle|1000 is out of range"),
+        (keyed("[{ frame = 1, value = 1.0 }, { frame = 2, value = [1.0] }]"), "comb[1].angle|different lengths"),
+        (keyed("[{ frame = 1, value = [1.0] }]"), "line 13|expected f64"),
+        (
+            "[[comb]]\nkind = \"mirror\"\nplane = { point = [{ frame = 1, value = [0, 0, 0] }, { frame = 2, value = [1, 0] }], \
+             normal = [0, 1, 0] }\n"
+                .to_owned(),
+            "comb[1].plane.point|different lengths",
+        ),
+        (
+            edit("kind = \"split\"\nof = \"a\"\ncount = [{ frame = 1, value = 3 }, { frame = 2, value = 4 }]"),
+            "floating point `3.0`, expected usize",
+        ),
+        (
+            cluster.replace("2.0", "[{ frame = 1, value = 1.0 }, { frame = 2, value = 2.0 }]"),
+            "cluster[0].radius|can't have key frames|help:",
+        ),
         ("[[comb]]\nkind = \"bend\"\nangle = 1.0\nhairs = [\"x*\"]\n".to_owned(), "comb[1].hairs|no hair `x*`"),
         (format!("{hair}{hair}"), "control.hair[1].name|used twice"),
         (format!("{hair}points = [[0.0, 5.0, 0.0]]\n"), "control.hair[0].points|apart"),

@@ -26,7 +26,7 @@ fn what_hair_follows_and_where_it_is_cut_combs_again() {
     );
     shot.report(&[]);
     shot.edit(GROOM, "through = { value = 1.0", "through = { value = 0.5");
-    expect(&shot, &combed, &["grooms/ball.toml: comb[2].panels.through.value 1 -> 0.5"]);
+    expect(&shot, &combed, &["grooms/ball.toml: comb[2].panels.through 1 -> 0.5"]);
     // Ball and hair: what is above the plane ends there.
     let cut =
         "[[comb]]\nkind = \"cut\"\nshear = { at = { point = [0.0, 5.5, 0.0], normal = [0.0, 1.0, 0.0] } }\n\n[[layer]]";

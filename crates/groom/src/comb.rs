@@ -85,9 +85,9 @@ pub enum CombKind<'a> {
         /// Polyline in rest scene space, at least two points; hairs turn toward its direction of travel.
         points: Vec<Vec3>,
         /// Distance of the root from the curve where its influence ends, scene units; infinite for everywhere.
-        radius: f64,
+        radius: Amount<'a>,
         /// Part of the radius over which influence fades (smoothstep): 0 a hard edge, 1 from the curve outward.
-        falloff: f64,
+        falloff: Amount<'a>,
         /// How far toward the curve's direction, 0 to 1.
         bend: Amount<'a>,
         /// Where along the hair, 0 to 1 (module documentation).
@@ -173,9 +173,9 @@ pub enum CombKind<'a> {
         reach: Option<Vec3>,
         /// Distance of a root from the handle's root where its influence ends, scene units; infinite for everywhere. The
         /// handle itself moves whatever the radius.
-        radius: f64,
+        radius: Amount<'a>,
         /// Part of the radius over which influence fades, as for a direction curve.
-        falloff: f64,
+        falloff: Amount<'a>,
     },
     /// Gives hairs behind a plane the mirrored shape of those in front: the blend of the nearest to the mirrored root, or the
     /// very hair that stands there (within 1e-6 of the mesh's diagonal), put at the hair's own root. Directions, lengths of
@@ -264,10 +264,9 @@ impl Given {
     fn new(kind: &CombKind, skin: &Skin, frames: &[Frame], hairs: &ControlHairs) -> Given {
         match kind {
             CombKind::Follow { guides, .. } => Given::Lines((guides.0)(&starts(frames, hairs))),
-            CombKind::Chain { handle, turn, reach, radius, falloff } => {
+            CombKind::Chain { handle, turn, reach, .. } => {
                 let handle = chain::find(handle, frames, hairs);
-                let motion =
-                    handle.map(|h| chain::motion(h, &frames[h], hairs.hair(h), turn, *reach, *radius, *falloff));
+                let motion = handle.map(|h| chain::motion(h, &frames[h], hairs.hair(h), turn, *reach));
                 motion.map_or(Given::Nothing, Given::Chain)
             }
             CombKind::Mirror { point, normal } => {
@@ -348,10 +347,12 @@ struct Hair<'a> {
 
 /// One operation on one hair.
 fn apply(kind: &CombKind, given: &Given, weight: f64, hair: Hair<'_>) -> CombCounts {
-    match given {
-        Given::Chain(motion) => return motion.apply(weight, hair),
-        Given::Mirror(front) => return front.apply(weight, hair),
-        Given::Nothing | Given::Lines(_) => {}
+    match (given, kind) {
+        (Given::Chain(motion), CombKind::Chain { radius, falloff, .. }) => {
+            return motion.apply(weight, radius.of(hair.index), falloff.of(hair.index), hair);
+        }
+        (Given::Mirror(front), _) => return front.apply(weight, hair),
+        _ => {}
     }
     let Hair { index, frame, uv, side: _, local, cut: left } = hair;
     let value = |map: &Option<&TiledMap>| map.map_or(1.0, |m| f64::from(m.value(uv)));
@@ -367,7 +368,8 @@ fn apply(kind: &CombKind, given: &Given, weight: f64, hair: Hair<'_>) -> CombCou
         CombKind::Chain { .. } | CombKind::Mirror { .. } => CombCounts::default(),
         CombKind::DirectionCurve { points, radius, falloff, bend, curvature } => {
             let Some((near, tangent)) = nearest(points, frame.origin) else { return CombCounts::default() };
-            let a = weight * bend.of(index) * influence((near - frame.origin).norm(), *radius, *falloff);
+            let a =
+                weight * bend.of(index) * influence((near - frame.origin).norm(), radius.of(index), falloff.of(index));
             turn_toward(to_local(frame, tangent), a, curvature.of(index), local)
         }
         CombKind::DirectionMap { map, space, bend, curvature } => {

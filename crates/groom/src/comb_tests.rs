@@ -82,7 +82,13 @@ fn cut_hair_ends_at_its_plane_and_is_never_longer() {
 
 fn curve(radius: f64, bend: f64, curvature: f64) -> CombKind<'static> {
     let points = vec![Vec3::new(-20.0, 12.0, 0.0), Vec3::new(20.0, 12.0, 5.0)];
-    CombKind::DirectionCurve { points, radius, falloff: 0.5, bend: bend.into(), curvature: curvature.into() }
+    CombKind::DirectionCurve {
+        points,
+        radius: radius.into(),
+        falloff: 0.5.into(),
+        bend: bend.into(),
+        curvature: curvature.into(),
+    }
 }
 
 fn flat(value: &[f32]) -> TiledMap {

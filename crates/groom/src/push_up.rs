@@ -242,8 +242,8 @@ mod tests {
         let points = vec![Vec3::zeros(), d];
         let kind = CombKind::DirectionCurve {
             points,
-            radius: f64::INFINITY,
-            falloff: 0.0,
+            radius: f64::INFINITY.into(),
+            falloff: 0.0.into(),
             bend: 1.0.into(),
             curvature: curvature.into(),
         };

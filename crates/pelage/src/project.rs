@@ -5,7 +5,8 @@ mod find;
 use crate::Error;
 use crate::cache::FileHashes;
 use crate::config::{
-    BodyKind, Comb, Document, Emitter, Feature, GroomFile, Key, Keyed, Layer, Material, SEGMENTS, ShotFile, Target,
+    BodyKind, Cluster, ClusterEdit, Comb, CombKind, Document, Emitter, Feature, GroomFile, Key, Keyed, Layer, Material,
+    SEGMENTS, ShotFile, Target,
 };
 use crate::quality::{self, Resolved};
 use find::{Finder, missing, named_maps};
@@ -159,6 +160,7 @@ impl Project {
                 }
                 let mut groom: Document<GroomFile> = Document::read_joined(&path)?;
                 groom.check()?;
+                groom.value = groom.at(f64::from(shot.value.shot.frames[0]));
                 groom.value.settle();
                 check_motion(&shot, &groom)?;
                 groom
@@ -306,13 +308,29 @@ impl Project {
 
     /// The combing at a frame, or at rest, without key frames.
     pub fn combs(&self, frame: Option<i32>) -> Vec<Comb> {
-        let moment = self.moment(frame);
-        self.groom.value.comb.iter().map(|c| c.at(moment)).collect()
+        match frame.filter(|_| self.combs_move()) {
+            Some(frame) => self.groom.at(f64::from(frame)).comb,
+            None => self.groom.value.comb.clone(),
+        }
+    }
+
+    /// Clusters at a frame, or at rest, and the steps of their making, without key frames.
+    pub fn clusters(&self, frame: Option<i32>) -> (Vec<Cluster>, Vec<ClusterEdit>) {
+        let GroomFile { cluster, cluster_edit, .. } = match frame.filter(|_| self.clusters_move()) {
+            Some(frame) => self.groom.at(f64::from(frame)),
+            None => self.groom.value.clone(),
+        };
+        (cluster, cluster_edit)
     }
 
     /// True if control hairs change over the shot by themselves.
     pub fn combs_move(&self) -> bool {
-        self.groom.value.comb.iter().any(Comb::is_animated)
+        moves_hairs(&self.groom).is_some()
+    }
+
+    /// True if clusters change over the shot by themselves.
+    pub fn clusters_move(&self) -> bool {
+        moving(&self.groom, "cluster").is_some()
     }
 
     /// What is simulated of a layer.
@@ -391,19 +409,27 @@ fn label(base: &Path, path: &Path) -> String {
     path.strip_prefix(base).unwrap_or(path).display().to_string()
 }
 
-/// Combing with key frames moves hair that is not simulated.
+/// The first value with several key frames below a key that begins so.
+fn moving<'a>(groom: &'a Document<GroomFile>, start: &str) -> Option<&'a str> {
+    groom.keyed().find(|k| k.key.starts_with(start) && k.frame.len() > 1).map(|k| k.key.as_str())
+}
+
+/// What moves control hairs.
+fn moves_hairs(groom: &Document<GroomFile>) -> Option<&str> {
+    let in_clusters = || groom.value.comb.iter().any(|c| c.kind == CombKind::Cluster);
+    moving(groom, "comb").or_else(|| moving(groom, "cluster").filter(|_| in_clusters()))
+}
+
+/// Key frames move hair that is not simulated.
 fn check_motion(shot: &Document<ShotFile>, groom: &Document<GroomFile>) -> Result<(), Error> {
-    let Some(i) = groom.value.comb.iter().position(Comb::is_animated) else { return Ok(()) };
     let simulated = |l: &&Layer| l.simulate.unwrap_or(shot.value.simulate.target) != Target::Off;
-    match groom.value.layer.iter().find(simulated) {
-        None => Ok(()),
-        Some(l) => {
-            let what = format!("has key frames, and layer {} is simulated: its hair would not follow them", l.name);
-            Err(groom
-                .error(&format!("comb[{i}]"), what, "set `simulate = \"off\"` for the layer, or take them out")
-                .into())
-        }
-    }
+    let shaped = |l: &&Layer| simulated(l) && l.cluster.as_ref().is_some_and(|c| c.simulate);
+    let layers = || groom.value.layer.iter();
+    let (combs, clusters) = (moves_hairs(groom), moving(groom, "cluster"));
+    let found = combs.zip(layers().find(simulated)).or_else(|| clusters.zip(layers().find(shaped)));
+    let Some((key, l)) = found else { return Ok(()) };
+    let what = format!("has key frames, and layer {} is simulated: its hair would not follow them", l.name);
+    Err(groom.error(key, what, "set `simulate = \"off\"` for the layer, or take them out").into())
 }
 
 /// Levels of clumps that a shot changes must be in its groom.

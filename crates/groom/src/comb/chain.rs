@@ -33,8 +33,6 @@ pub(super) struct Motion {
     at: Vec3,
     /// Turn of each segment in the root frame: axis and angle in radians.
     turn: Vec<Option<(Vec3, f64)>>,
-    radius: f64,
-    falloff: f64,
 }
 
 /// The hair that a handle names.
@@ -55,8 +53,6 @@ pub(super) fn motion(
     local: &[[f32; 3]],
     turn: &[(usize, Vec3)],
     reach: Option<Vec3>,
-    radius: f64,
-    falloff: f64,
 ) -> Motion {
     let segment: Vec<Vec3> = local.windows(2).map(|w| vec3(w[1]) - vec3(w[0])).collect();
     let length: Vec<f64> = segment.iter().map(|v| v.norm()).collect();
@@ -76,14 +72,14 @@ pub(super) fn motion(
     for k in (1..turn.len()).filter(|&k| length[k] == 0.0) {
         turn[k] = turn[k - 1];
     }
-    Motion { handle, at: frame.origin, turn, radius, falloff }
+    Motion { handle, at: frame.origin, turn }
 }
 
 impl Motion {
-    /// Moves one hair along.
-    pub(super) fn apply(&self, weight: f64, hair: Hair<'_>) -> CombCounts {
+    /// Moves one hair along, within a radius.
+    pub(super) fn apply(&self, weight: f64, radius: f64, falloff: f64, hair: Hair<'_>) -> CombCounts {
         let distance = (hair.frame.origin - self.at).norm();
-        let influence = if hair.index == self.handle { 1.0 } else { influence(distance, self.radius, self.falloff) };
+        let influence = if hair.index == self.handle { 1.0 } else { influence(distance, radius, falloff) };
         let a = (weight * influence).clamp(0.0, 1.0);
         if a == 0.0 || self.turn.iter().all(Option::is_none) {
             return CombCounts::default();
@@ -186,7 +182,7 @@ mod tests {
     }
 
     fn chain(handle: Handle, turn: Vec<(usize, Vec3)>, reach: Option<Vec3>, radius: f64) -> CombKind<'static> {
-        CombKind::Chain { handle, turn, reach, radius, falloff: 0.5 }
+        CombKind::Chain { handle, turn, reach, radius: radius.into(), falloff: 0.5.into() }
     }
 
     /// All hairs with one bent shape.

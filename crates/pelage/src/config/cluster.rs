@@ -3,6 +3,7 @@
 use super::GroomFile;
 use super::document::{ConfigError, Document, exactly, some_exactly};
 use super::groom::{MapRef, points, some_points};
+use super::keys::may_have_keys;
 use super::look_value::LookValue;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -37,6 +38,7 @@ pub struct Scalp {
 /// A cluster of hair: a cylinder along a line.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = may_have_keys)]
 pub struct Cluster {
     /// Name, unique. Those split from it are `name/0`, `name/1`, and so on.
     pub name: String,
@@ -63,6 +65,7 @@ pub struct Cluster {
 /// `tail/*` for all of them.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = may_have_keys)]
 pub struct ClusterEdit {
     /// What it does.
     pub kind: ClusterEditKind,

@@ -4,7 +4,7 @@ use super::GroomFile;
 use super::document::{ConfigError, Document, exactly, some_exactly};
 use super::groom::{MapRef, some_points};
 use super::guides::{Ball, Element, Panels, Plane, Primitive, Region, Shear};
-use super::keyed::{Keyed, Vector};
+use super::keys::may_have_keys;
 use super::look_value::{LookValue, varied};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -13,6 +13,7 @@ use std::path::PathBuf;
 /// One combing operation. Which keys it reads depends on its kind.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = may_have_keys)]
 pub struct Comb {
     /// What it does.
     pub kind: CombKind,
@@ -27,9 +28,9 @@ pub struct Comb {
     #[serde(default, deserialize_with = "some_points")]
     pub points: Option<Vec<[f64; 3]>>,
     /// direction-curve, chain: region of influence around the curve or the hair, scene units. Default: everywhere.
-    pub radius: Option<Keyed<f64>>,
+    pub radius: Option<LookValue>,
     /// direction-curve, chain: share of the radius over which the influence fades, 0 (hard) to 1. Default: 1.
-    pub falloff: Option<Keyed<f64>>,
+    pub falloff: Option<LookValue>,
     /// direction-curve, direction-map, field, flow, cluster: how far hairs turn toward the direction, 0 to 1. Default: 1.
     pub bend: Option<LookValue>,
     /// 0: the whole hair turns at its root; 1: the turn grows from root to tip. Default: 0.
@@ -58,7 +59,8 @@ pub struct Comb {
     #[serde(default)]
     pub turn: Vec<JointTurn>,
     /// chain: where its tip goes, after the turns, scene units.
-    pub reach: Option<Keyed<Vector>>,
+    #[serde(default, deserialize_with = "some_exactly")]
+    pub reach: Option<[f64; 3]>,
     /// mirror: the plane; hair behind it (where its normal does not point) mirrors hair before it.
     pub plane: Option<Plane>,
     /// field: vector fields, whose sum hair follows.
@@ -91,6 +93,7 @@ pub struct Comb {
 /// A length of hair at a place.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = may_have_keys)]
 pub struct KeyLength {
     /// The place, on or near the skin, scene units.
     #[serde(deserialize_with = "exactly")]
@@ -102,51 +105,26 @@ pub struct KeyLength {
 /// A turn of a chain at one of its joints.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = may_have_keys)]
 pub struct JointTurn {
     /// The joint, 0 at the root.
     pub joint: usize,
     /// Axis and angle: a vector along the normal, u and normal x u of the root, as long as the angle in degrees.
-    pub turn: Keyed<Vector>,
+    #[serde(deserialize_with = "exactly")]
+    pub turn: [f64; 3],
 }
 
 impl Comb {
-    /// It at a frame: without key frames.
-    pub fn at(&self, frame: f64) -> Comb {
-        let mut out = self.clone();
-        out.each_keyed(&mut |k| *k = Keyed::constant(k.at(frame)), &mut |k| {
-            *k = Keyed::constant(Vector(k.vectors().at(frame)))
-        });
-        out
-    }
-
-    /// True if something of it has key frames.
-    pub fn is_animated(&self) -> bool {
-        let (mut one, mut three) = (1, 1);
-        self.clone().each_keyed(&mut |k| one = one.max(k.0.len()), &mut |k| three = three.max(k.0.len()));
-        one.max(three) > 1
-    }
-
-    /// Everything of it that may have key frames: numbers, and vectors.
-    fn each_keyed(&mut self, one: &mut dyn FnMut(&mut Keyed<f64>), three: &mut dyn FnMut(&mut Keyed<Vector>)) {
-        let values = [&mut self.weight, &mut self.curvature].into_iter();
-        let some = [&mut self.bend, &mut self.angle, &mut self.amount, &mut self.value].into_iter().flatten();
-        values.chain(some).for_each(|v| one(&mut v.0.value));
-        [&mut self.radius, &mut self.falloff].into_iter().flatten().for_each(&mut *one);
-        self.reach.iter_mut().chain(self.turn.iter_mut().map(|t| &mut t.turn)).for_each(&mut *three);
-        for p in &mut self.primitive {
-            one(&mut p.strength);
-            [&mut p.amplitude, &mut p.phase].into_iter().flatten().for_each(&mut *one);
-            [&mut p.position, &mut p.turn].into_iter().chain(&mut p.direction).for_each(&mut *three);
-        }
-        for e in &mut self.element {
-            one(&mut e.strength);
-            [&mut e.velocity, &mut e.at, &mut e.axis].into_iter().flatten().for_each(&mut *three);
-        }
-    }
-
     /// Values that only some kinds read, by key.
     fn values(&self) -> impl Iterator<Item = (&'static str, &LookValue)> {
-        let all = [("bend", &self.bend), ("angle", &self.angle), ("amount", &self.amount), ("value", &self.value)];
+        let all = [
+            ("radius", &self.radius),
+            ("falloff", &self.falloff),
+            ("bend", &self.bend),
+            ("angle", &self.angle),
+            ("amount", &self.amount),
+            ("value", &self.value),
+        ];
         all.into_iter().filter_map(|(key, v)| Some((key, v.as_ref()?)))
     }
 
@@ -275,24 +253,20 @@ impl Document<GroomFile> {
             let help = "name one of the [[parting]] of this file";
             return Err(self.error(&format!("{key}.parting"), format!("there is no parting `{name}`"), help));
         }
-        let unit = |name: &str| matches!(name, "weight" | "curvature" | "bend" | "amount");
+        let unit = |name: &str| matches!(name, "weight" | "curvature" | "bend" | "amount" | "falloff");
         for (name, v) in c.varied() {
             let range = match name {
                 "angle" => [-720.0, 720.0],
                 _ if unit(name) => [0.0, 1.0],
+                "radius" => [0.0, f64::MAX],
                 _ => [0.0, 1e6],
             };
             self.check_value(&format!("{key}.{name}"), &varied("", v, range))?;
         }
-        for (name, k, most) in [("radius", &c.radius, f64::MAX), ("falloff", &c.falloff, 1.0)] {
-            k.iter().try_for_each(|k| self.keyed(&format!("{key}.{name}"), k, |x| (0.0..=most).contains(x)))?;
+        let turns = c.turn.iter().enumerate().map(|(i, t)| (format!("{key}.turn[{i}].turn"), t.turn));
+        for (at, v) in c.reach.iter().map(|v| (format!("{key}.reach"), *v)).chain(turns) {
+            v.into_iter().try_for_each(|x| self.within(&at, x, -1e9, 1e9))?;
         }
-        let finite = |v: &Vector| v.0.iter().all(|x| x.abs() <= 1e9);
-        c.reach.iter().try_for_each(|k| self.keyed(&format!("{key}.reach"), k, finite))?;
-        c.turn
-            .iter()
-            .enumerate()
-            .try_for_each(|(i, t)| self.keyed(&format!("{key}.turn[{i}].turn"), &t.turn, finite))?;
         if let Some(n) = c.hairs.iter().flatten().find(|n| !self.has_hair(n)) {
             return Err(self.error(&format!("{key}.hairs"), format!("there is no hair `{n}`"), NO_HAIR));
         }
@@ -325,14 +299,6 @@ impl Document<GroomFile> {
 
     pub(super) fn has_hair(&self, pattern: &String) -> bool {
         !self.value.control.named(std::slice::from_ref(pattern)).is_empty()
-    }
-
-    /// Checks a value, or key frames, each.
-    pub(super) fn keyed<T>(&self, key: &str, k: &Keyed<T>, good: impl Fn(&T) -> bool) -> Result<(), ConfigError> {
-        if !k.0.iter().all(|k| good(&k.value) && k.frame.abs() <= 1e9) {
-            return Err(self.error(key, "has a number that is out of range", "see the reference for what it may be"));
-        }
-        self.check_keys(key, k)
     }
 }
 

@@ -1,6 +1,7 @@
 //! A configuration file: its text, what it says, and where it says it.
 
 use super::joined::Source;
+use super::keys::{self, AllKeys, KeyFrames};
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceSpan};
 use serde::de::{Deserialize, DeserializeOwned, Deserializer, Error as _};
 use std::collections::BTreeMap;
@@ -96,6 +97,7 @@ pub struct Document<T> {
     source: Source,
     /// Keys that other files than the first say, and which.
     elsewhere: BTreeMap<String, usize>,
+    keys: AllKeys,
 }
 
 impl<T: DeserializeOwned> Document<T> {
@@ -115,14 +117,34 @@ impl<T: DeserializeOwned> Document<T> {
     }
 
     fn of(source: Source) -> Result<Self, ConfigError> {
-        let tree = source.tree()?;
+        let mut tree = source.tree()?;
         let elsewhere = source.elsewhere(tree.get_ref());
-        let read = T::deserialize(toml::Deserializer::from(tree));
-        let value = read.map_err(|e| {
-            source.error(e.span(), first_line(e.message()), suggestion(e.message()).unwrap_or_default())
-        })?;
-        Ok(Document { path: source.part[0].path.clone(), value, source, elsewhere })
+        let keys = AllKeys::find(tree.get_mut()).map_err(|f| source.complaint(f))?;
+        let value = read_at(&source, &keys, f64::MIN)?;
+        Ok(Document { path: source.part[0].path.clone(), value, source, elsewhere, keys })
     }
+
+    /// What it says at a frame number; `value` is what it says before the first key frame.
+    pub fn at(&self, frame: f64) -> T {
+        // Key frames hold numbers of one kind, so what is read at one frame is read at all.
+        read_at(&self.source, &self.keys, frame).expect("it was read before")
+    }
+
+    /// It as it is at a frame number.
+    pub(super) fn settled(&self, frame: f64) -> Self {
+        let Document { path, source, elsewhere, keys, .. } = self;
+        let (path, source, elsewhere, keys) = (path.clone(), source.clone(), elsewhere.clone(), keys.clone());
+        Document { path, value: self.at(frame), source, elsewhere, keys }
+    }
+}
+
+/// What a file says with the values of a frame number in the place of key frames.
+fn read_at<T: DeserializeOwned>(source: &Source, keys: &AllKeys, frame: f64) -> Result<T, ConfigError> {
+    let text = keys.text(frame);
+    let mut tree = source.tree()?;
+    keys::put(tree.get_mut(), &text);
+    T::deserialize(toml::Deserializer::from(tree))
+        .map_err(|e| source.error(e.span(), first_line(e.message()), suggestion(e.message()).unwrap_or_default()))
 }
 
 fn read_text(path: &Path) -> Result<String, ConfigError> {
@@ -153,6 +175,11 @@ impl<T> Document<T> {
     pub fn error(&self, key: &str, what: impl Into<String>, help: impl Into<String>) -> ConfigError {
         let span = self.source.tree().ok().and_then(|tree| span_of(tree.get_ref(), key));
         self.source.error(span, format!("{key}: {}", what.into()), help.into())
+    }
+
+    /// Values of combing and clusters that have key frames.
+    pub fn keyed(&self) -> impl Iterator<Item = &KeyFrames> {
+        self.keys.each()
     }
 
     /// The files that it was read from and their texts, the one that includes the others first.

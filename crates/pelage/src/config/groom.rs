@@ -4,6 +4,7 @@ use super::cluster::{Cluster, ClusterEdit, ClusterLook, Scalp};
 use super::comb::{Comb, NO_HAIR};
 use super::control::Control;
 use super::document::{ConfigError, Document, Fixed, exactly};
+use super::keys::ROOTED;
 use super::look::{Clump, Collision, Curl, Emitter, Noise, Operator, Wave, WindLook};
 use super::simulate::{Material, Target, check_material};
 use schemars::JsonSchema;
@@ -352,8 +353,21 @@ impl GroomFile {
 }
 
 impl Document<GroomFile> {
-    /// Checks values that types can't.
+    /// Checks values that types can't, at every key frame.
     pub fn check(&self) -> Result<(), ConfigError> {
+        self.check_now()?;
+        let rooted = |key: &str| key.starts_with("cluster[") && ROOTED.contains(&key.rsplit('.').next().unwrap_or(key));
+        if let Some(k) = self.keyed().find(|k| rooted(&k.key)) {
+            let help = "its roots stay where they are: key `points`, `width` or `twist`";
+            return Err(self.error(&k.key, "can't have key frames", help));
+        }
+        let mut frames: Vec<f64> = self.keyed().flat_map(|k| k.frame.clone()).collect();
+        frames.sort_by(f64::total_cmp);
+        frames.dedup();
+        frames.into_iter().try_for_each(|frame| self.settled(frame).check_now())
+    }
+
+    fn check_now(&self) -> Result<(), ConfigError> {
         self.check_control()?;
         for (i, p) in self.value.parting.iter().enumerate() {
             let key = format!("parting[{i}]");

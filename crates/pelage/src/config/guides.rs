@@ -3,8 +3,9 @@
 use super::GroomFile;
 use super::comb::Comb;
 use super::document::{ConfigError, Document, exactly, some_exactly};
-use super::groom::{Feature, some_points};
-use super::keyed::{Keyed, Vector};
+use super::groom::some_points;
+use super::keys::may_have_keys;
+use super::look_value::{LookValue, varied};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -15,11 +16,13 @@ const MOST_PANELS: usize = 8000;
 /// A vector field, for combing of the kind "field". Hair follows the sum of all of them.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = may_have_keys)]
 pub struct Primitive {
     /// Its direction at a point.
     pub orientation: Orientation,
     /// constant: the direction. wave: where hair runs.
-    pub direction: Option<Keyed<Vector>>,
+    #[serde(default, deserialize_with = "some_exactly")]
+    pub direction: Option<[f64; 3]>,
     /// along, roller: a line, at least two points.
     #[serde(default, deserialize_with = "some_points")]
     pub points: Option<Vec<[f64; 3]>>,
@@ -33,18 +36,18 @@ pub struct Primitive {
     /// wave: its length, scene units.
     pub wavelength: Option<f64>,
     /// wave: greatest slope. Default: 0.5.
-    pub amplitude: Option<Keyed<f64>>,
+    pub amplitude: Option<f64>,
     /// wave: degrees; at 0 it begins at its steepest. Default: 0.
-    pub phase: Option<Keyed<f64>>,
+    pub phase: Option<f64>,
     /// Origin of its coordinates, scene units. Default: 0, 0, 0.
-    #[serde(default = "origin")]
-    pub position: Keyed<Vector>,
+    #[serde(default, deserialize_with = "exactly")]
+    pub position: [f64; 3],
     /// Turns its coordinates about x, then y, then z, degrees. Default: 0, 0, 0.
-    #[serde(default = "origin")]
-    pub turn: Keyed<Vector>,
+    #[serde(default, deserialize_with = "exactly")]
+    pub turn: [f64; 3],
     /// Strength against the others; negative turns it round. Default: 1.
     #[serde(default = "unit")]
-    pub strength: Keyed<f64>,
+    pub strength: f64,
     /// How the strength falls with distance from the origin, or from the line. Default: it doesn't.
     pub falloff: Option<Falloff>,
     /// Lengths of its axes that count as distance 1, scene units. Default: 1, 1, 1.
@@ -58,12 +61,8 @@ pub struct Primitive {
     pub across: bool,
 }
 
-fn origin() -> Keyed<Vector> {
-    Keyed::constant(Vector([0.0; 3]))
-}
-
-fn unit() -> Keyed<f64> {
-    Keyed::constant(1.0)
+fn unit() -> f64 {
+    1.0
 }
 
 fn ones() -> [f64; 3] {
@@ -93,6 +92,7 @@ pub enum Orientation {
 /// How a strength falls with distance: with `exponent`, or with `from` and `to`.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = may_have_keys)]
 pub struct Falloff {
     /// (near / distance)^exponent, and 1 within `near`.
     pub exponent: Option<f64>,
@@ -112,6 +112,7 @@ pub struct Falloff {
 /// `normal`).
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = may_have_keys)]
 pub struct Region {
     /// Centre of an ellipsoid, scene units.
     #[serde(default, deserialize_with = "some_exactly")]
@@ -133,6 +134,7 @@ pub struct Region {
 /// Where hair is cut: at a plane, or at others on both sides of one that parts the scalp.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = may_have_keys)]
 pub struct Shear {
     /// Hair is cut at this plane.
     pub at: Option<Plane>,
@@ -147,6 +149,7 @@ pub struct Shear {
 /// A plane.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = may_have_keys)]
 pub struct Plane {
     /// A point of it, scene units.
     #[serde(deserialize_with = "exactly")]
@@ -159,6 +162,7 @@ pub struct Plane {
 /// A ball that stands for the scalp.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = may_have_keys)]
 pub struct Ball {
     /// Its centre, scene units.
     #[serde(deserialize_with = "exactly")]
@@ -170,21 +174,25 @@ pub struct Ball {
 /// An element of ideal flow, for combing of the kind "flow".
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = may_have_keys)]
 pub struct Element {
     /// What it is.
     pub kind: ElementKind,
     /// stream: velocity.
-    pub velocity: Option<Keyed<Vector>>,
+    #[serde(default, deserialize_with = "some_exactly")]
+    pub velocity: Option<[f64; 3]>,
     /// source, vortex: a point, scene units.
-    pub at: Option<Keyed<Vector>>,
+    #[serde(default, deserialize_with = "some_exactly")]
+    pub at: Option<[f64; 3]>,
     /// vortex: direction of its line.
-    pub axis: Option<Keyed<Vector>>,
+    #[serde(default, deserialize_with = "some_exactly")]
+    pub axis: Option<[f64; 3]>,
     /// filament: a line, at least two points.
     #[serde(default, deserialize_with = "some_points")]
     pub points: Option<Vec<[f64; 3]>>,
     /// source: volume a time, negative for a sink. vortex, filament: circulation. Default: 1.
     #[serde(default = "unit")]
-    pub strength: Keyed<f64>,
+    pub strength: f64,
     /// source, vortex, filament: within this distance the velocity falls to zero, scene units. Default: 0.1.
     #[serde(default = "tenth")]
     pub core: f64,
@@ -211,6 +219,7 @@ pub enum ElementKind {
 /// Panels under the skin that hold a flow off it, for combing of the kind "flow".
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = may_have_keys)]
 pub struct Panels {
     /// At most so many triangles, made from the skin. Default: 1000.
     #[serde(default = "thousand")]
@@ -219,20 +228,16 @@ pub struct Panels {
     pub file: Option<PathBuf>,
     /// Speed at which the flow comes out of the skin, negative to go in; its map is read where the skin is nearest to a panel.
     /// Default: 0.
-    #[serde(default = "nothing")]
-    pub through: Feature,
+    #[serde(default = "super::look::zero")]
+    pub through: LookValue,
 }
 
 fn thousand() -> usize {
     1000
 }
 
-fn nothing() -> Feature {
-    super::groom::constant(0.0)
-}
-
-fn is_direction(v: &Vector) -> bool {
-    v.0 != [0.0; 3] && v.0.iter().all(|x| x.is_finite())
+fn is_direction(v: &[f64; 3]) -> bool {
+    *v != [0.0; 3] && v.iter().all(|x| x.abs() <= 1e9)
 }
 
 impl Document<GroomFile> {
@@ -258,10 +263,13 @@ impl Document<GroomFile> {
         if !(20..=MOST_PANELS).contains(&p.most) {
             return Err(self.error(&format!("{key}.panels.most"), "is out of range", format!("20 to {MOST_PANELS}")));
         }
-        if p.through.noise != 0.0 {
-            return Err(self.error(&format!("{key}.panels.through.noise"), "is not read here", "take it out"));
+        let through = format!("{key}.panels.through");
+        for (name, given) in [("noise", p.through.0.noise != 0.0), ("vary", !p.through.0.vary.is_empty())] {
+            if given {
+                return Err(self.error(&format!("{through}.{name}"), "is not read here", "take it out"));
+            }
         }
-        self.within(&format!("{key}.panels.through.value"), p.through.value, -1e6, 1e6)
+        self.check_value(&through, &varied("", &p.through, [-1e6, 1e6]))
     }
 
     /// Each `(name, given, read)`: what is read must be given, and what is not must not.
@@ -318,27 +326,19 @@ impl Document<GroomFile> {
             ],
         )?;
         self.line(&format!("{key}.points"), p.points.as_ref())?;
-        let sway = p.sway.map(|v| Keyed::constant(Vector(v)));
-        for (name, k) in [("direction", &p.direction), ("sway", &sway)] {
-            if k.iter().any(|k| !k.0.iter().all(|k| is_direction(&k.value))) {
-                return Err(self.error(
-                    &format!("{key}.{name}"),
-                    "must be a direction",
-                    "for example [0.0, -1.0, 0.0]",
-                ));
-            }
+        for (name, v) in [("direction", p.direction), ("sway", p.sway)] {
+            self.direction(&format!("{key}.{name}"), v)?;
         }
         for (name, x) in [("radius", p.radius), ("wavelength", p.wavelength)] {
             self.within(&format!("{key}.{name}"), x.unwrap_or(1.0), 1e-9, 1e9)?;
         }
         self.within(&format!("{key}.pitch"), p.pitch.unwrap_or(0.0), -1e9, 1e9)?;
-        for (name, k) in [("amplitude", &p.amplitude), ("phase", &p.phase)] {
-            k.iter().try_for_each(|k| self.keyed(&format!("{key}.{name}"), k, |x| x.abs() <= 1e9))?;
-        }
-        p.direction.iter().try_for_each(|k| self.keyed(&format!("{key}.direction"), k, is_direction))?;
-        self.keyed(&format!("{key}.strength"), &p.strength, |x| x.abs() <= 1e9)?;
-        for (name, k) in [("position", &p.position), ("turn", &p.turn)] {
-            self.keyed(&format!("{key}.{name}"), k, |v| v.0.iter().all(|x| x.abs() <= 1e9))?;
+        let numbers = [("amplitude", p.amplitude), ("phase", p.phase), ("strength", Some(p.strength))];
+        numbers
+            .into_iter()
+            .try_for_each(|(name, x)| self.within(&format!("{key}.{name}"), x.unwrap_or(0.0), -1e9, 1e9))?;
+        for (name, v) in [("position", p.position), ("turn", p.turn)] {
+            v.into_iter().try_for_each(|x| self.within(&format!("{key}.{name}"), x, -1e9, 1e9))?;
         }
         for x in &p.shape {
             self.within(&format!("{key}.shape"), *x, 1e-9, 1e9)?;
@@ -380,9 +380,7 @@ impl Document<GroomFile> {
         )?;
         let numbers = [r.centre, r.point, r.normal, Some(r.turn)].into_iter().flatten().flatten();
         numbers.into_iter().try_for_each(|x| self.within(key, x, -1e9, 1e9))?;
-        if r.normal == Some([0.0; 3]) {
-            return Err(self.error(&format!("{key}.normal"), "must be a direction", "for example [1.0, 0.0, 0.0]"));
-        }
+        self.direction(&format!("{key}.normal"), r.normal)?;
         r.radii.iter().flatten().try_for_each(|x| self.within(&format!("{key}.radii"), *x, 1e-9, 1e9))
     }
 
@@ -399,16 +397,19 @@ impl Document<GroomFile> {
             ],
         )?;
         self.line(&format!("{key}.points"), e.points.as_ref())?;
-        for (name, k) in [("velocity", &e.velocity), ("at", &e.at)] {
-            let good = |v: &Vector| v.0.iter().all(|x| x.abs() <= 1e9);
-            k.iter().try_for_each(|k| self.keyed(&format!("{key}.{name}"), k, good))?;
+        for (name, v) in [("velocity", e.velocity), ("at", e.at)] {
+            v.iter().flatten().try_for_each(|x| self.within(&format!("{key}.{name}"), *x, -1e9, 1e9))?;
         }
-        if e.axis.iter().any(|k| !k.0.iter().all(|k| is_direction(&k.value))) {
-            return Err(self.error(&format!("{key}.axis"), "must be a direction", "for example [1.0, 0.0, 0.0]"));
-        }
-        e.axis.iter().try_for_each(|k| self.keyed(&format!("{key}.axis"), k, is_direction))?;
-        self.keyed(&format!("{key}.strength"), &e.strength, |x| x.abs() <= 1e12)?;
+        self.direction(&format!("{key}.axis"), e.axis)?;
+        self.within(&format!("{key}.strength"), e.strength, -1e12, 1e12)?;
         self.within(&format!("{key}.core"), e.core, 0.0, 1e9)
+    }
+
+    fn direction(&self, key: &str, v: Option<[f64; 3]>) -> Result<(), ConfigError> {
+        match v.is_none_or(|v| is_direction(&v)) {
+            true => Ok(()),
+            false => Err(self.error(key, "must be a direction", "for example [1.0, 0.0, 0.0]")),
+        }
     }
 
     pub(super) fn line(&self, key: &str, points: Option<&Vec<[f64; 3]>>) -> Result<(), ConfigError> {

@@ -3,6 +3,7 @@
 //! All files lie one behind the other in one space of byte offsets, so that the span of a value says its file too.
 
 use super::document::{ConfigError, first_line, nearest, tidy};
+use super::keys::has_frame;
 use miette::{NamedSource, SourceSpan};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -51,10 +52,17 @@ pub struct Source {
 }
 
 /// What is wrong, and where.
-struct Flaw {
+#[derive(Debug)]
+pub struct Flaw {
     what: String,
     help: String,
     span: Range<usize>,
+}
+
+impl Flaw {
+    pub(super) fn new(what: String, help: &str, span: Range<usize>) -> Flaw {
+        Flaw { what, help: help.to_owned(), span }
+    }
 }
 
 impl Source {
@@ -173,7 +181,7 @@ impl Source {
         ConfigError { path: part.path.clone(), what, help, source, span }
     }
 
-    fn complaint(&self, flaw: Flaw) -> ConfigError {
+    pub(super) fn complaint(&self, flaw: Flaw) -> ConfigError {
         self.error(Some(flaw.span), flaw.what, flaw.help)
     }
 
@@ -243,7 +251,7 @@ fn relocate(v: &mut DeValue<'_>, folder: &Path) {
 }
 
 /// Puts a table on top of another: tables are joined key by key, tables of one name in lists of tables too; other tables of
-/// such lists come last, and what else both have is taken from `over`.
+/// such lists come last, and what else both have is taken from `over`, key frames as a whole.
 fn merge<'a>(under: &mut DeTable<'a>, over: DeTable<'a>) {
     for (key, value) in over {
         let Some(below) = under.get_mut(&key) else {
@@ -253,7 +261,9 @@ fn merge<'a>(under: &mut DeTable<'a>, over: DeTable<'a>) {
         let span = value.span();
         match (below.get_mut(), value.into_inner()) {
             (DeValue::Table(b), DeValue::Table(o)) => merge(b, o),
-            (DeValue::Array(b), DeValue::Array(o)) if lists_tables(b) && lists_tables(&o) => {
+            (DeValue::Array(b), DeValue::Array(o))
+                if lists_tables(b) && lists_tables(&o) && !o.iter().any(has_frame) =>
+            {
                 for item in o.iter().cloned() {
                     let name = name_of(item.get_ref());
                     let same = b.iter_mut().find(|i| name.is_some() && name_of(i.get_ref()) == name);

@@ -43,6 +43,18 @@ fn a_file_lies_on_top_of_what_it_includes() {
 }
 
 #[test]
+fn key_frames_replace_key_frames() {
+    let keys = |value: f64| format!("[{{ frame = 1, value = 0.5 }}, {{ frame = 3, value = {value:?} }}]");
+    let base = format!("[style.flat]\nkind = \"lay-down\"\namount = {}\n{BASE}", keys(0.7));
+    let top = format!("include = \"b.toml\"\n[[comb]]\nlike = \"flat\"\namount = {}\n", keys(0.9));
+    let (doc, _dir) = read(&[("b.toml", &base), ("top.toml", &top)]).expect("sound files");
+    let amount = |frame: f64| doc.at(frame).comb[1].amount.as_ref().map(|v| v.at(0.0));
+    assert_eq!([0.0, 1.0, 2.0, 3.0, 9.0].map(amount), [0.5, 0.5, 0.5 + (0.9 - 0.5) * 0.5, 0.9, 0.9].map(Some));
+    let keyed: Vec<_> = doc.keyed().map(|k| (k.key.as_str(), &k.frame[..])).collect();
+    assert_eq!(keyed, [("comb[1].amount", &[1.0, 3.0][..])]);
+}
+
+#[test]
 fn complaints_name_the_file_and_the_line() {
     let wrong = |files: &[(&str, &str)]| {
         let e = read(files).expect_err("an unsound file");

@@ -8,6 +8,7 @@ mod groom;
 mod guides;
 mod joined;
 mod keyed;
+mod keys;
 mod light;
 mod look;
 mod look_check;
@@ -25,6 +26,7 @@ pub use groom::{Channel, ColorFeature, Feature, GroomFile, Guard, GuideChoice, L
 pub use groom::{WidthFeature, WrapMode};
 pub use guides::{Ball, Element, ElementKind, Falloff, Orientation, Panels, Plane, Primitive, Region, Shear};
 pub use keyed::{Amount, Key, Keyed, Vector};
+pub use keys::KeyFrames;
 pub use light::{Light, LightKind, Shadow, ShadowQuality};
 pub use look::{
     Clump, ClumpOf, Collision, Curl, CurlKind, CurlWave, Dilation, Emitter, Noise, Operator, Wave, WaveAxis, WaveShape,

@@ -28,7 +28,7 @@ pub(super) fn named_maps(groom: &GroomFile) -> Vec<(String, PathBuf)> {
         }
         add(format!("comb[{i}].region.map"), c.region.as_ref().map(|m| &m.map));
         add(format!("comb[{i}].map.map"), c.map.as_ref().map(|m| &m.map));
-        let through = c.panels.as_ref().and_then(|p| p.through.map.as_ref());
+        let through = c.panels.as_ref().and_then(|p| p.through.0.map.as_ref());
         add(format!("comb[{i}].panels.through.map"), through);
     }
     for (i, l) in groom.layer.iter().enumerate() {

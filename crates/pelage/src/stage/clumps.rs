@@ -221,7 +221,7 @@ fn part(side: &mut Vec<[u64; 2]>, dividers: &[Region], first: usize, position: &
 
 /// Clusters of a level as clumps; centres are the hairs nearest to their middles.
 fn in_clusters(run: &mut Runner<'_>, level: usize, roots: &Roots, open: &[bool]) -> Result<Members, Error> {
-    let (tree, uv) = (clusters::tree(run)?, clusters::coordinates(run, &roots.root)?);
+    let (tree, uv) = (clusters::tree(run, None)?, clusters::coordinates(run, &roots.root)?);
     let mut of = clusters::owners(&tree, &uv, Some(level));
     of.iter_mut().zip(open).filter(|(_, open)| !**open).for_each(|(k, _)| *k = NONE);
     let middle = middles(&tree, &of, &uv);

@@ -55,34 +55,40 @@ pub(super) fn growing(run: &mut Runner<'_>, i: usize, roots: &[SurfacePoint]) ->
     let drawn = |p: &[f64; 2]| growth.is_empty() || growth.iter().any(|line| scalp::inside(line, *p));
     let mut out: Vec<bool> = at.par_iter().map(drawn).collect();
     if within {
-        let of = owners(&*tree(run)?, &at, None);
+        let of = owners(&*tree(run, None)?, &at, None);
         out.iter_mut().zip(of).for_each(|(o, k)| *o &= k != NONE);
     }
     Ok(out)
 }
 
-/// The clusters of the groom.
-pub(super) fn tree(run: &mut Runner<'_>) -> Result<Arc<Tree>, Error> {
-    if let Some(found) = &run.tree {
+/// The clusters of the groom at a frame, or at rest, where no root is in another cluster than at any frame.
+pub(super) fn tree(run: &mut Runner<'_>, frame: Option<i32>) -> Result<Arc<Tree>, Error> {
+    let frame = frame.filter(|_| run.project.clusters_move());
+    if let Some((_, found)) = run.tree.iter().find(|(at, _)| *at == frame) {
         return Ok(found.clone());
     }
     let (skin, map) = (groom::skin(run)?, painted(run)?);
     let groom = &run.project.groom;
     let space = space(&groom.value.scalp, map.as_ref());
     let view = groom::view(&skin);
+    let (clusters, edits) = run.project.clusters(frame);
     let mut tree = Tree::default();
-    for (i, c) in groom.value.cluster.iter().enumerate() {
+    for (i, c) in clusters.iter().enumerate() {
         let wrong = |e: String| groom.error(&format!("cluster[{i}]"), e, "see where it stands on the skin");
         let onto = |p: Vec3| skin.bvh().closest(p, f64::INFINITY).map(|c| c.point).unwrap_or_default();
         let cluster = cluster(c, &view, &space, &onto).map_err(wrong)?;
         tree.cluster.push(cluster);
         tree.shape(i as u32).map_err(wrong)?;
     }
-    for (i, e) in groom.value.cluster_edit.iter().enumerate() {
+    for (i, e) in edits.iter().enumerate() {
         let wrong = |e: String| groom.error(&format!("cluster_edit[{i}]"), e, "");
-        apply(&mut tree, &groom.value.cluster, e).map_err(wrong)?;
+        apply(&mut tree, &clusters, e).map_err(wrong)?;
     }
-    Ok(run.tree.insert(Arc::new(tree)).clone())
+    // The one at rest and that of one frame.
+    run.tree.retain(|(at, _)| at.is_none());
+    let tree = Arc::new(tree);
+    run.tree.push((frame, tree.clone()));
+    Ok(tree)
 }
 
 fn cluster(

@@ -72,7 +72,7 @@ fn comb_hairs(run: &mut Runner<'_>, what: What) -> Result<ControlHairs, Error> {
     let millimetre = 1e-3 / project.shot.value.shot.meters_per_unit;
     let clearance = control.clearance * millimetre;
     let guard = Guard { surface: skin.bvh(), clearance };
-    let (guides, points) = (guides::guides(run, &combs, &hairs)?, hairs.points);
+    let (guides, points) = (guides::guides(run, what.comb_frame(), &combs, &hairs)?, hairs.points);
     let trace: Vec<_> =
         guides.iter().map(|g| g.as_ref().map(|g| |starts: &[Start]| g.lines(points, &guard, starts))).collect();
     let ops: Vec<CombOp<'_>> = combs
@@ -148,8 +148,8 @@ fn trimmer(path: &Path) -> Result<Bvh, Error> {
 fn operation<'a>(run: &Runner<'_>, c: &Comb, read: &'a Read, guides: Option<Guides<'a>>) -> CombOp<'a> {
     let curvature = read.amount("curvature", Some(&c.curvature), 0.0);
     let bend = read.amount("bend", c.bend.as_ref(), 1.0);
-    let radius = c.radius.as_ref().map_or(f64::INFINITY, |k| k.at(0.0));
-    let falloff = c.falloff.as_ref().map_or(1.0, |k| k.at(0.0));
+    let radius = read.amount("radius", c.radius.as_ref(), f64::INFINITY);
+    let falloff = read.amount("falloff", c.falloff.as_ref(), 1.0);
     let map = read.map.as_ref();
     let kind = match c.kind {
         Kind::DirectionCurve => CombKind::DirectionCurve {
@@ -191,8 +191,8 @@ fn operation<'a>(run: &Runner<'_>, c: &Comb, read: &'a Read, guides: Option<Guid
             };
             CombKind::Chain {
                 handle,
-                turn: c.turn.iter().map(|t| (t.joint, t.turn.vectors().at(0.0).into())).collect(),
-                reach: c.reach.as_ref().map(|k| k.vectors().at(0.0).into()),
+                turn: c.turn.iter().map(|t| (t.joint, t.turn.into())).collect(),
+                reach: c.reach.map(Vec3::from),
                 radius,
                 falloff,
             }

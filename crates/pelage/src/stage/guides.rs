@@ -7,8 +7,7 @@ use super::tables::{decode, encode, table};
 use super::{What, clusters, groom};
 use crate::Error;
 use crate::config::{
-    Ball, Comb, CombKind, Element, ElementKind, GroomFile, Keyed, Orientation, Panels, Plane, Primitive, Region, Shear,
-    Vector,
+    Ball, Comb, CombKind, Element, ElementKind, GroomFile, Orientation, Panels, Plane, Primitive, Region, Shear,
 };
 use crate::format::ply::{self, Column};
 use nalgebra::UnitQuaternion;
@@ -56,13 +55,18 @@ pub(super) struct Flow {
 }
 
 /// What the operations of a groom let hairs follow; `None` for those that follow nothing.
-pub(super) fn guides(run: &mut Runner<'_>, combs: &[Comb], hairs: &ControlHairs) -> Result<Vec<Option<Guides>>, Error> {
+pub(super) fn guides(
+    run: &mut Runner<'_>,
+    frame: Option<i32>,
+    combs: &[Comb],
+    hairs: &ControlHairs,
+) -> Result<Vec<Option<Guides>>, Error> {
     let each = combs.iter().enumerate();
     each.map(|(i, c)| match c.kind {
         CombKind::Field => Ok(Some(Guides::Field(field_of(c)))),
         CombKind::Flow => Ok(Some(Guides::Flow(flow_of(run, i, c)?))),
         CombKind::Cluster => {
-            let (tree, uv) = (clusters::tree(run)?, clusters::coordinates(run, &hairs.root)?);
+            let (tree, uv) = (clusters::tree(run, frame)?, clusters::coordinates(run, &hairs.root)?);
             let of = clusters::owners(&tree, &uv, Some(c.level.unwrap_or(0)));
             Ok(Some(Guides::Clusters(InClusters { tree, of, uv })))
         }
@@ -123,11 +127,6 @@ fn points(p: Option<&Vec<[f64; 3]>>) -> Vec<Vec3> {
     p.into_iter().flatten().map(|p| Vec3::from(*p)).collect()
 }
 
-/// A vector without key frames.
-fn now(k: &Keyed<Vector>) -> Vec3 {
-    k.vectors().at(0.0).into()
-}
-
 fn vector(v: Option<[f64; 3]>) -> Vec3 {
     Vec3::from(v.unwrap_or_default())
 }
@@ -140,9 +139,8 @@ fn field_of(c: &Comb) -> GuideField {
 }
 
 fn primitive(p: &Primitive) -> field::Primitive {
-    let direction = || p.direction.as_ref().map_or(Vec3::zeros(), now);
     let orientation = match p.orientation {
-        Orientation::Constant => field::Orientation::Constant { direction: direction() },
+        Orientation::Constant => field::Orientation::Constant { direction: vector(p.direction) },
         Orientation::Radial => field::Orientation::Radial,
         Orientation::Around => field::Orientation::Around,
         Orientation::Along => field::Orientation::Along { points: points(p.points.as_ref()) },
@@ -153,11 +151,11 @@ fn primitive(p: &Primitive) -> field::Primitive {
             pitch: p.pitch.unwrap_or(0.1),
         },
         Orientation::Wave => field::Orientation::Wave {
-            along: direction(),
+            along: vector(p.direction),
             across: vector(p.sway),
             wavelength: p.wavelength.unwrap_or(1.0),
-            amplitude: p.amplitude.as_ref().map_or(0.5, |k| k.at(0.0)),
-            phase: p.phase.as_ref().map_or(0.0, |k| k.at(0.0)).to_radians(),
+            amplitude: p.amplitude.unwrap_or(0.5),
+            phase: p.phase.unwrap_or(0.0).to_radians(),
         },
     };
     let falloff = match &p.falloff {
@@ -173,9 +171,9 @@ fn primitive(p: &Primitive) -> field::Primitive {
         },
     };
     field::Primitive {
-        position: now(&p.position),
-        rotation: turned(p.turn.vectors().at(0.0)),
-        strength: p.strength.at(0.0),
+        position: p.position.into(),
+        rotation: turned(p.turn),
+        strength: p.strength,
         falloff,
         shape: p.shape.into(),
         domain: p.domain.iter().map(region).collect(),
@@ -220,13 +218,11 @@ pub(super) fn ball(b: &Ball) -> lengths::Sphere {
 }
 
 fn element(e: &Element) -> flow::Element {
-    let (at, strength, core) = (e.at.as_ref().map_or(Vec3::zeros(), now), e.strength.at(0.0), e.core);
+    let (at, strength, core) = (vector(e.at), e.strength, e.core);
     match e.kind {
-        ElementKind::Stream => flow::Element::Stream { velocity: e.velocity.as_ref().map_or(Vec3::zeros(), now) },
+        ElementKind::Stream => flow::Element::Stream { velocity: vector(e.velocity) },
         ElementKind::Source => flow::Element::Source { at, strength, core },
-        ElementKind::Vortex => {
-            flow::Element::Vortex { at, axis: e.axis.as_ref().map_or(Vec3::zeros(), now), strength, core }
-        }
+        ElementKind::Vortex => flow::Element::Vortex { at, axis: vector(e.axis), strength, core },
         ElementKind::Filament => flow::Element::Filament { points: points(e.points.as_ref()), strength, core },
     }
 }
@@ -303,5 +299,5 @@ fn body_of(run: &mut Runner<'_>, i: usize, p: &Panels, element: &[flow::Element]
 /// Speed through the skin where it is nearest to a point.
 fn speed(skin: &Mesh, bvh: &Bvh, p: &Panels, map: Option<&TiledMap>, at: Vec3) -> f64 {
     let painted = map.zip(bvh.closest(at, f64::INFINITY)).map(|(map, near)| f64::from(map.value(skin.uv(&near.point))));
-    p.through.value * painted.unwrap_or(1.0)
+    p.through.at(0.0) * painted.unwrap_or(1.0)
 }

@@ -120,7 +120,7 @@ pub(super) fn density(run: &mut Runner<'_>, i: usize) -> Result<LayerDensity, Er
 }
 
 /// True if a layer consists of control hairs placed one by one.
-fn is_by_hand(run: &Runner<'_>, i: usize) -> bool {
+pub(super) fn is_by_hand(run: &Runner<'_>, i: usize) -> bool {
     !run.project.groom.value.layer[i].hairs.is_empty()
 }
 

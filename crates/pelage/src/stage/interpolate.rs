@@ -28,7 +28,7 @@ pub struct LayerHairs {
     pub hair: Vec<[u32; 3]>,
     /// Their weights.
     pub weight: Vec<[f32; 3]>,
-    /// Lengths, scene units.
+    /// Lengths before they are cut, scene units.
     pub length: Vec<f32>,
 }
 
@@ -38,10 +38,7 @@ fn layer(run: &mut Runner<'_>, i: usize) -> Result<Rc<LayerHairs>, Error> {
     }
     let roots = instance::roots(run, i)?;
     let (hair, weight) = instance::weights(run, i)?;
-    let mut length = instance::column(run, What::Length(i), i)?;
-    if run.project.groom.value.comb.iter().any(|c| matches!(c.kind, CombKind::Cut | CombKind::Trim)) {
-        cut_lengths(&hair, &weight, &comb::combed(run)?.cut, &mut length);
-    }
+    let length = instance::column(run, What::Length(i), i)?;
     let points = run.project.base_points(i);
     let most = points.max(run.project.points(i));
     if u32::try_from(roots.id.len() * most).is_err() {
@@ -122,12 +119,29 @@ fn controls(run: &mut Runner<'_>, what: What) -> Result<Rc<ControlHairs>, Error>
     }
 }
 
+/// Lengths of a layer's hairs in a step, scene units: cut, and changed as control hairs change that are hairs themselves.
+fn lengths(run: &mut Runner<'_>, what: What, i: usize, layer: &LayerHairs) -> Result<Vec<f32>, Error> {
+    let (now, rest) = (controls(run, what)?, comb::combed(run)?);
+    let mut length = layer.length.clone();
+    if !Rc::ptr_eq(&now, &rest) && instance::is_by_hand(run, i) {
+        for (length, [own, ..]) in length.iter_mut().zip(&layer.hair) {
+            let [now, rest] = [&now, &rest].map(|c| c.length(*own as usize));
+            *length *= if rest > 0.0 { (now / rest) as f32 } else { 1.0 };
+        }
+    }
+    if run.project.groom.value.comb.iter().any(|c| matches!(c.kind, CombKind::Cut | CombKind::Trim)) {
+        cut_lengths(&layer.hair, &layer.weight, &now.cut, &mut length);
+    }
+    Ok(length)
+}
+
 /// Hairs blended from control hairs, and how many had directions that cancelled.
 fn blended(run: &mut Runner<'_>, what: What, i: usize, at: &SkinAt) -> Result<(Vec<[f32; 3]>, usize), Error> {
     let skin = groom::skin(run)?;
     let layer = layer(run, i)?;
     let pose = groom::pose(run, at)?;
     let from_roots = run.project.groom.value.layer[i].root_frames;
+    let length = lengths(run, what, i, &layer)?;
     let control = match (what, run.project.target(i)) {
         (What::Frame(_, f), Target::ControlHairs) => {
             let simulated = simulate::positions(run, i, f)?;
@@ -148,7 +162,7 @@ fn blended(run: &mut Runner<'_>, what: What, i: usize, at: &SkinAt) -> Result<(V
         root: if from_roots { &origin } else { &root },
         hair: &layer.hair,
         weight: &layer.weight,
-        length: &layer.length,
+        length: &length,
     };
     let mut out = vec![[0.0f32; 3]; layer.roots.id.len() * layer.points];
     let found = interpolate(&blend, &control, &mut out);

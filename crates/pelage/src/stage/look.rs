@@ -167,8 +167,8 @@ fn collide(
     Ok(())
 }
 
-/// What does not change over the shot, made once a run for each set of parts: at rest and for the frames. `now` are the
-/// hairs that come into the step.
+/// What does not change over the shot, made once a run for each set of parts: at rest and for the frames. Where clusters
+/// move it is made for each frame. `now` are the hairs that come into the step.
 fn prepared(
     run: &mut Runner<'_>,
     what: What,
@@ -178,7 +178,9 @@ fn prepared(
 ) -> Result<Rc<LayerLook>, Error> {
     let i = what.layer().expect("hairs are of a layer");
     let shaping = matches!(what, What::Rest(_));
-    if let Some(found) = run.looks.get(&(i, shaping)) {
+    let in_moving_clusters = |e: &Effect| e.clusters(run.project, i) && run.project.clusters_move();
+    let moment = what.frame().filter(|_| acting.iter().any(in_moving_clusters));
+    if let Some((_, found)) = run.looks.get(&(i, shaping)).filter(|(at, _)| *at == moment) {
         return Ok(found.clone());
     }
     let skin = groom::skin(run)?;
@@ -193,12 +195,12 @@ fn prepared(
         look.axes = rest_axes(&skin.mesh, &skin.topology, &skin.rest, &roots.root, points, &rest);
     }
     if acting.contains(&Effect::Cluster) {
-        look.clusters = in_clusters(run, i, points, &rest, &look.axes)?;
+        look.clusters = in_clusters(run, i, moment, points, &rest, &look.axes)?;
     }
     for effect in acting {
         columns(run, i, *effect, &roots, &sites, &mut look)?;
         if let Effect::Clump(k) = effect
-            && let Some(lines) = clump_lines(run, i, *k, points)?
+            && let Some(lines) = clump_lines(run, i, moment, *k, points)?
         {
             let members = clumps::clumps(run, i, *k)?;
             let axes = carried(&skin.mesh, &skin.topology, &skin.rest, &roots.root, &look.axes);
@@ -208,7 +210,7 @@ fn prepared(
     }
     note_coarse_curls(run, i, acting, points)?;
     let look = Rc::new(look);
-    run.looks.insert((i, shaping), look.clone());
+    run.looks.insert((i, shaping), (moment, look.clone()));
     Ok(look)
 }
 
@@ -217,13 +219,19 @@ fn refined(position: Vec<[f32; 3]>, from: usize, to: usize) -> Vec<[f32; 3]> {
 }
 
 /// The lines of a level's clumps where these are no hairs, scene units.
-fn clump_lines(run: &mut Runner<'_>, i: usize, k: usize, points: usize) -> Result<Option<Vec<Vec<Vec3>>>, Error> {
+fn clump_lines(
+    run: &mut Runner<'_>,
+    i: usize,
+    frame: Option<i32>,
+    k: usize,
+    points: usize,
+) -> Result<Option<Vec<Vec<Vec3>>>, Error> {
     let c = &run.project.groom.value.layer[i].clump[k];
     if let Some(lines) = &c.curves {
         return Ok(Some(lines.iter().map(|l| l.iter().map(|p| Vec3::from(*p)).collect()).collect()));
     }
     let Some(level) = c.clusters else { return Ok(None) };
-    let (members, roots, tree) = (clumps::clumps(run, i, k)?, instance::roots(run, i)?, clusters::tree(run)?);
+    let (members, roots, tree) = (clumps::clumps(run, i, k)?, instance::roots(run, i)?, clusters::tree(run, frame)?);
     let centre: Vec<_> = members.centre.iter().map(|h| roots.root[*h as usize]).collect();
     let of = clusters::owners(&tree, &clusters::coordinates(run, &centre)?, Some(level));
     let line = |k: &u32| cluster::line(&tree.shape(*k).expect("the tree was checked"), points);
@@ -246,12 +254,13 @@ struct InClusters {
 fn in_clusters(
     run: &mut Runner<'_>,
     i: usize,
+    frame: Option<i32>,
     points: usize,
     rest: &[[f32; 3]],
     axes: &[RootAxes],
 ) -> Result<InClusters, Error> {
     let layer = run.project.groom.value.layer[i].cluster.clone().expect("the layer has clusters");
-    let (skin, tree, roots) = (groom::skin(run)?, clusters::tree(run)?, instance::roots(run, i)?);
+    let (skin, tree, roots) = (groom::skin(run)?, clusters::tree(run, frame)?, instance::roots(run, i)?);
     let uv = clusters::coordinates(run, &roots.root)?;
     let top = clusters::owners(&tree, &uv, Some(0));
     let middle = cluster::middles(&tree, &top, &uv);

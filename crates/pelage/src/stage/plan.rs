@@ -102,7 +102,7 @@ pub(super) mod version {
     pub const WEIGHTS: u32 = 1;
     pub const COLUMN: u32 = 1;
     pub const SIMULATE: u32 = 6;
-    pub const INTERPOLATE: u32 = 1;
+    pub const INTERPOLATE: u32 = 2;
     pub const CLUMP: u32 = 1;
     pub const LOOK: u32 = 3;
     pub const COLLISION: u32 = 3;

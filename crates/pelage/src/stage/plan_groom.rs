@@ -47,7 +47,7 @@ impl Reader<'_> {
         let (key, length) = self.project.control_length();
         r = r.with(self.feature("length", &key, &length));
         for (i, c) in self.project.combs(frame).iter().enumerate() {
-            r = self.comb_fields(r, i, c);
+            r = self.comb_fields(r, i, c, frame);
         }
         let control = &groom.control;
         r = r.param("push_up", control.push_up, self.in_groom("control.push_up"));
@@ -75,7 +75,7 @@ impl Reader<'_> {
         let growth = &groom.scalp.growth;
         if groom.layer[i].in_clusters {
             let name = format!("layer[{i}].in_clusters");
-            r = self.clusters(self.rest(r.param("in_clusters", true, self.in_groom(&name))));
+            r = self.clusters(self.rest(r.param("in_clusters", true, self.in_groom(&name))), None);
         } else if !growth.is_empty() {
             r = self.scalp(r);
         }
@@ -86,11 +86,11 @@ impl Reader<'_> {
         r
     }
 
-    /// What clusters read.
-    pub(super) fn clusters(&self, r: Recipe) -> Recipe {
-        let groom = &self.project.groom.value;
-        let r = self.plain(self.scalp(r), "cluster", &groom.cluster);
-        self.plain(r, "cluster_edit", &groom.cluster_edit)
+    /// What clusters read at a frame, or at rest.
+    pub(super) fn clusters(&self, r: Recipe, frame: Option<i32>) -> Recipe {
+        let (clusters, edits) = self.project.clusters(frame);
+        let r = self.plain(self.scalp(r), "cluster", &clusters);
+        self.plain(r, "cluster_edit", &edits)
     }
 
     /// Numbers and names of a value, each with its key.
@@ -105,7 +105,7 @@ impl Reader<'_> {
         r.param("names", format!("{names:?}"), self.in_groom("control.hair"))
     }
 
-    fn comb_fields(&self, mut r: Recipe, i: usize, c: &Comb) -> Recipe {
+    fn comb_fields(&self, mut r: Recipe, i: usize, c: &Comb, frame: Option<i32>) -> Recipe {
         let name = |key: &str| format!("comb[{i}].{key}");
         let mut add = |key: &str, value: Option<String>| {
             if let Some(value) = value {
@@ -114,12 +114,10 @@ impl Reader<'_> {
         };
         add("kind", Some(format!("{:?}", c.kind)));
         add("points", c.points.as_ref().map(|p| format!("{p:?}")));
-        add("radius", c.radius.as_ref().map(ToString::to_string));
-        add("falloff", c.falloff.as_ref().map(ToString::to_string));
         add("hairs", c.hairs.as_ref().map(|n| format!("{n:?}")));
         add("hair", c.hair.clone());
         add("at", c.at.map(|p| format!("{p:?}")));
-        add("reach", c.reach.as_ref().map(ToString::to_string));
+        add("reach", c.reach.map(|p| format!("{p:?}")));
         // A parting's name means nothing by itself: its place in the list does.
         let parting = |n: &String| self.project.groom.value.parting.iter().position(|p| p.name == *n);
         add("parting", c.parting.as_ref().and_then(parting).map(|p| p.to_string()));
@@ -136,7 +134,7 @@ impl Reader<'_> {
             r = r.with(map.iter().flat_map(|m| self.map(&name(key), m)));
         }
         if c.kind == CombKind::Cluster {
-            r = self.clusters(r);
+            r = self.clusters(r, frame);
         }
         self.comb_guides(r, i, c)
     }
@@ -160,7 +158,7 @@ impl Reader<'_> {
         }
         let Some(panels) = &c.panels else { return r };
         let name = |key: &str| format!("comb[{i}].panels.{key}");
-        r = r.with(self.feature(&name("through"), &name("through"), &panels.through));
+        r = r.with(self.value(&name("through"), &name("through"), &panels.through, 0.0));
         self.panels_of(i, panels, r)
     }
 

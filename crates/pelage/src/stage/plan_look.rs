@@ -36,6 +36,15 @@ impl Effect {
         }
     }
 
+    /// True if it follows clusters.
+    pub fn clusters(self, project: &Project, i: usize) -> bool {
+        match self {
+            Effect::Cluster => true,
+            Effect::Clump(k) => project.groom.value.layer[i].clump[k].clusters.is_some(),
+            _ => false,
+        }
+    }
+
     /// Its key below the layer's.
     pub fn key(self) -> String {
         match self {
@@ -258,7 +267,7 @@ impl Reader<'_> {
         }
         if let Some(level) = c.clusters {
             r = r.param("clusters", level, self.in_groom(&format!("{at}.clusters")));
-            r = self.rest(self.clusters(r));
+            r = self.rest(self.clusters(r, None));
         }
         if c.regions.is_some() && c.size.is_none() {
             let density = format!("layer[{i}].density.value");
@@ -313,6 +322,10 @@ impl Reader<'_> {
         for (name, value) in self.settings_of(i, effect) {
             r = r.param(&format!("{key}.{name}"), value, self.in_groom(&format!("{at}.{name}")));
         }
+        // The clusters at rest are read by the clumps' own step.
+        if effect == Effect::Cluster || effect.clusters(self.project, i) && self.project.clusters_move() {
+            r = self.rest(self.clusters(r, frame));
+        }
         match effect {
             Effect::Clump(k) => {
                 let all = self.project.groom.value.emitter.iter().enumerate();
@@ -324,7 +337,6 @@ impl Reader<'_> {
                     }
                 }
             }
-            Effect::Cluster => r = self.rest(self.clusters(r)),
             Effect::Wave(k) => {
                 let map = layer.wave[k].map.as_ref();
                 r = r.with(map.iter().flat_map(|m| self.map_at(&format!("{key}.root"), &format!("{at}.map"), m)));

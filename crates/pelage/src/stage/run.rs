@@ -93,9 +93,9 @@ pub struct Runner<'a> {
     pub(super) layers: BTreeMap<usize, Rc<super::interpolate::LayerHairs>>,
     pub(super) sites: BTreeMap<usize, Rc<super::clumps::RestSites>>,
     pub(super) members: BTreeMap<(usize, usize), Rc<pelage_groom::look::member::Members>>,
-    pub(super) looks: BTreeMap<(usize, bool), Rc<super::look::LayerLook>>,
+    pub(super) looks: BTreeMap<(usize, bool), (Option<i32>, Rc<super::look::LayerLook>)>,
     /// Clusters of the groom.
-    pub(super) tree: Option<std::sync::Arc<pelage_groom::cluster::Tree>>,
+    pub(super) tree: Vec<(Option<i32>, std::sync::Arc<pelage_groom::cluster::Tree>)>,
     pub(super) barrier: Option<Rc<super::look::Barrier>>,
     /// Particles of emitters that have a file.
     pub(super) particles: BTreeMap<usize, Rc<Vec<pelage_groom::areas::Particle>>>,
@@ -151,7 +151,7 @@ impl<'a> Runner<'a> {
             sites: BTreeMap::new(),
             members: BTreeMap::new(),
             looks: BTreeMap::new(),
-            tree: None,
+            tree: Vec::new(),
             barrier: None,
             particles: BTreeMap::new(),
             scene: None,
