@@ -409,6 +409,67 @@ fn every_number_of_combing_and_clusters_may_have_key_frames() {
     }
 }
 
+/// Numbers with a map that is 1 in the half of small u and 0 in the other: with it, without a map, and 0.
+const PAINTED: [[&str; 3]; 3] = [
+    [
+        "[[comb]]\nkind = \"field\"\n[[comb.primitive]]\norientation = \"radial\"\n[[comb.primitive]]\norientation = \"constant\"\n\
+         direction = [0.0, 3.0, 9.0]\nstrength = ",
+        "{ value = 1.0, map = \"../maps/half.png\" }",
+        "1.0",
+    ],
+    [
+        "[[comb]]\nkind = \"direction-curve\"\npoints = [[-9.0, 0.0, 0.0], [9.0, 0.0, 9.0]]\nfalloff = 0.1\nradius = ",
+        "{ value = 20.0, map = \"../maps/half.png\" }",
+        "20.0",
+    ],
+    ["[layer.guard]\nlength = 3.0\npercent = ", "{ value = 0.5, map = \"../maps/half.png\" }", "0.5"],
+];
+
+#[test]
+fn numbers_are_painted() {
+    for [key, map, all] in PAINTED {
+        let layer = "[[layer]]\nname = \"coat\"\ndensity = { value = 2.0 }\nlength = { value = 2.0 }\n";
+        let control = "[control]\nplacement = { per_cm2 = 4.0 }\npoints = 6\n";
+        let hairs = |value: &str| {
+            let own = format!("{key}{value}\n");
+            let text = if key.starts_with("[layer.") { format!("{layer}{own}") } else { format!("{own}{layer}") };
+            let shot = groomed(&format!("{control}{text}"));
+            shot.write("maps/half.png", grey_png(64, 1, |x, _| if x < 32 { 255 } else { 0 }));
+            shot.report(&[]);
+            exported_hairs(&shot.path().join("out/ball/hair.mcap"))
+        };
+        let (painted, full, none) = (hairs(map), hairs(all), hairs("0.0"));
+        let (mut differ, mut mixed) = ([0; 2], 0);
+        for (id, h) in painted.iter().filter(|(id, _)| full[*id].shape != none[*id].shape) {
+            let lit = h.uv()[0] < 0.5;
+            differ[usize::from(lit)] += 1;
+            mixed += usize::from(h.shape != if lit { &full } else { &none }[id].shape);
+        }
+        // Where both halves meet, and on seams, hair is blended of control hairs of both.
+        assert!(differ.iter().all(|n| *n > 50) && mixed * 5 < differ[0] + differ[1], "{key} {differ:?} {mixed}");
+    }
+    // Control hairs stand where the map lets them, each where it stands without the map.
+    let shot = groomed(WHISKERS);
+    shot.write("maps/half.png", grey_png(64, 1, |x, _| if x < 32 { 255 } else { 0 }));
+    let placed = || {
+        let report = shot.report(&[]);
+        let groom =
+            report["stages"].as_array().expect("stages").iter().find(|s| s["name"] == "groom").expect("it").clone();
+        groom["counts"]["control hairs"].as_u64().expect("a count")
+    };
+    let before = placed();
+    let from = WHISKERS.lines().find(|l| l.starts_with("placement")).expect("a placement");
+    let number = from.split("per_cm2 = ").nth(1).and_then(|r| r.split([' ', ',']).next()).expect("a density");
+    let to = from.replace(
+        &format!("per_cm2 = {number}"),
+        &format!("per_cm2 = {{ value = {number}, map = \"../maps/half.png\" }}"),
+    );
+    shot.edit(GROOM, from, &to);
+    assert!(shot.plan(&[]).1.contains("maps/half.png added"));
+    let after = placed();
+    assert!(after < before && after > before / 3, "{before} -> {after}");
+}
+
 #[test]
 fn hair_stays_on_its_side_of_a_divider() {
     let groom = r#"

@@ -101,6 +101,52 @@ fn length_simulates_and_looks_do_not() {
     assert!(before.iter().all(|(k, h)| h.shape == after[k].shape && h.look != after[k].look));
 }
 
+/// Where hairs of the overcoat are in all frames, and how far along u their roots, by id.
+fn overcoat(shot: &ShotFolder) -> BTreeMap<u64, (f32, Vec<u32>)> {
+    let over = hairs(shot).into_iter().filter(|((name, _), _)| name == "over");
+    over.map(|((_, id), h)| (id, (h.uv()[0], h.shape))).collect()
+}
+
+#[test]
+fn materials_are_painted() {
+    let shot = finished(3);
+    let paint = |dark: u8| grey_png(64, 1, |x, _| if x < 32 { 255 } else { dark });
+    shot.write("maps/stiff.png", paint(51));
+    let bend = |value: &str| format!("name = \"over\"\nmaterial = {{ young_gpa = 0.05, bend_factor = {value} }}");
+    let painted = "{ value = 5.0, map = \"../maps/stiff.png\" }";
+    let mut before = "name = \"over\"".to_owned();
+    let mut other = |value: &str| {
+        shot.edit(GROOM, &before, &bend(value));
+        before = bend(value);
+        shot.report(&[]);
+        overcoat(&shot)
+    };
+    let (stiff, both) = (other("5.0"), other(painted));
+    let mut seen = [0; 2];
+    for (id, (u, shape)) in both.iter().filter(|(_, (u, _))| !(0.48..0.52).contains(u)) {
+        // Exactly as stiff where the map is 1, and softer where it is darker.
+        assert_eq!(*shape == stiff[id].1, *u < 0.5, "hair {id} at {u}");
+        seen[usize::from(*u < 0.5)] += 1;
+    }
+    assert!(seen[0] > 5 && seen[1] > 5, "{seen:?} hairs");
+    shot.write("maps/stiff.png", paint(128));
+    let (run, why) = shot.plan(&[]);
+    assert!(run.contains("simulate/over/1") && !run.iter().any(|r| r.contains("under")), "{run:?}");
+    assert_eq!(why.iter().collect::<Vec<_>>(), ["maps/stiff.png changed"]);
+    // What a map paints too low is refused, not simulated.
+    shot.write("maps/stiff.png", paint(0));
+    let said = String::from_utf8(shot.pelage(&["run"]).stderr).expect("text");
+    assert!(said.contains("layer[1].material.bend_factor: 0 is out of range") && said.contains("its map"), "{said}");
+    // Variation alone, through control hairs too.
+    shot.edit(GROOM, &before, &bend("{ value = 5.0, noise = 0.5 }"));
+    shot.edit(SHOT, "segments = 8", "segments = 8\ntarget = \"control-hairs\"");
+    shot.report(&[]);
+    let varied = overcoat(&shot);
+    shot.edit(GROOM, &bend("{ value = 5.0, noise = 0.5 }"), &bend("5.0"));
+    shot.report(&[]);
+    assert!(overcoat(&shot) != varied);
+}
+
 #[test]
 fn parameters_gravity_and_wind_simulate() {
     let shot = finished(6);

@@ -282,6 +282,21 @@ fn values_out_of_range_in_the_groom() {
         ("name = \"over\"", "name = \"over\"\nguard = { percent = 0.5, length = -1 }", "layer[1].guard.length|help:"),
         ("name = \"over\"", "name = \"over\"\nguard = { percent = 0.5, width = inf }", "layer[1].guard.width|help:"),
         ("name = \"over\"", "name = \"over\"\nguard = { length = 2 }", "percent"),
+        (
+            "name = \"over\"",
+            "name = \"over\"\nguard = { percent = [{ frame = 1, value = 0 }, { frame = 2, value = 1 }] }",
+            "layer[1].guard.percent|can't have key frames|help:",
+        ),
+        (
+            "name = \"over\"",
+            "name = \"over\"\nmaterial = { density = [{ frame = 1, value = 1 }, { frame = 2, value = 1 }] }",
+            "layer[1].material.density|can't have key frames|help:",
+        ),
+        (
+            "name = \"over\"",
+            "name = \"over\"\nmaterial = { diameter = { value = 70, map = \"none.png\" } }",
+            "layer[1].material.diameter.map|none.png",
+        ),
         ("name = \"over\"", "name = \"over\"\nguard = { percent = 0.5, colour = 1 }", "colour"),
         ("name = \"over\"", "name = \"under\"", "layer[1].name|twice|help:"),
         ("name = \"over\"", "name = \"\"", "layer[1].name|help:"),

@@ -12,7 +12,7 @@ fn what_hair_follows_and_where_it_is_cut_combs_again() {
     let combed = with_files(&["groom/comb", "interpolate/under/*", "interpolate/over/*"]);
     let before = hairs(&shot);
     shot.edit(GROOM, "strength = 2.0", "strength = -2.0");
-    expect(&shot, &combed, &["grooms/ball.toml: comb[1].primitive[0].strength 2.0 -> -2.0"]);
+    expect(&shot, &combed, &["grooms/ball.toml: comb[1].primitive[0].strength 2 -> -2"]);
     assert!(hairs(&shot) != before, "hair turns round");
     // Lines keep the clearance, whether hair is pushed up or not.
     shot.edit(GROOM, "points = 6\n", "points = 6\npush_up = false\nclearance = 0.5\n");

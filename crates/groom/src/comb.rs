@@ -40,7 +40,7 @@ pub struct Amount<'a> {
 
 impl Amount<'_> {
     /// That of a hair.
-    fn of(&self, h: usize) -> f64 {
+    pub fn of(&self, h: usize) -> f64 {
         self.value * self.factor.get(h).map_or(1.0, |f| f64::from(*f))
     }
 }

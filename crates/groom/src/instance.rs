@@ -1,6 +1,7 @@
 //! Hairs from candidates and maps: which exist, where they stand, what they are like (paper §3.3).
 
 use crate::candidates::{Candidates, strand_id};
+use crate::comb::Amount;
 use crate::triangulate::Triangulation;
 use pelage_geom::{Mesh, StrandId, SurfacePoint, TiledMap, Topology, rng};
 use rayon::prelude::*;
@@ -180,9 +181,9 @@ pub fn is_guard(id: StrandId, share: f64, seed: u64) -> bool {
 
 /// Multiplies the values of guard hairs (see [`is_guard`]) by `factor`; leaves the others as they are. \[N\] values of
 /// the hairs of `roots`.
-pub fn scale_guards(values: &mut [f32], roots: &Roots, share: f64, factor: f32, seed: u64) {
-    let hairs = values.par_iter_mut().zip(&roots.id).with_min_len(CHUNK);
-    hairs.filter(|(_, id)| is_guard(**id, share, seed)).for_each(|(value, _)| *value *= factor);
+pub fn scale_guards(values: &mut [f32], roots: &Roots, share: Amount, factor: f32, seed: u64) {
+    let hairs = values.par_iter_mut().zip(&roots.id).enumerate().with_min_len(CHUNK);
+    hairs.filter(|(h, (_, id))| is_guard(**id, share.of(*h), seed)).for_each(|(_, (value, _))| *value *= factor);
 }
 
 /// 1 - noise to 1 + noise.

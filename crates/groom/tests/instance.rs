@@ -313,7 +313,7 @@ fn guard_hairs_are_a_share_of_all_and_more_share_only_adds() {
             "{share}: {found}"
         );
         let mut longer = plain.clone();
-        scale_guards(&mut longer, &r, share, 1.5, 1);
+        scale_guards(&mut longer, &r, share.into(), 1.5, 1);
         for k in 0..n {
             assert_eq!(longer[k], if guard[k] { plain[k] * 1.5 } else { plain[k] });
         }
@@ -348,7 +348,7 @@ fn results_do_not_depend_on_threads() {
             let w = weights(&r, &t);
             let f = Feature { value: 1.0, map: Some(&image), noise: 0.3, channel: 4 };
             let mut column = feature_column(&r, &f, 3);
-            scale_guards(&mut column, &r, 0.2, 1.5, 3);
+            scale_guards(&mut column, &r, 0.2.into(), 1.5, 3);
             (column, t, w, r)
         })
     };

@@ -283,7 +283,7 @@ fn strands() -> Vec<Strand> {
         .map(|k| {
             let bend = 0.2 + 0.1 * k as f64;
             let point = (0..=50).map(|i| 0.2 * f64::from(i) / 50.0).map(|s| Vec3::new(s, -bend * s * s, 0.0)).collect();
-            Strand { index: k, point }
+            Strand { index: k, point, material: Material::default() }
         })
         .collect()
 }

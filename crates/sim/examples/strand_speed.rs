@@ -37,7 +37,7 @@ fn measure(count: usize, segments: usize, curve: f64, wide: bool) {
         wide,
         ..Settings::default()
     };
-    let hairs = Hairs { offsets: &offsets, position: &position, id: &id };
+    let hairs = Hairs { offsets: &offsets, position: &position, id: &id, material: &[] };
     let g = [0.0, -9.81, 0.0];
     let (mut sim, _) = Simulation::new(&hairs, &settings, g).unwrap();
     let body = Body::default();

@@ -4,7 +4,7 @@ use crate::band::HELD;
 use crate::contact::Keep;
 use crate::lanes::{LANES, Pack};
 use crate::rod::Elastic;
-use crate::settings::{End, Settings};
+use crate::settings::{End, Material, Settings};
 use crate::springs::kernel::{self, NodeAltitude};
 use crate::springs::layout::Layout;
 use crate::springs::plain;
@@ -19,6 +19,8 @@ pub struct Strand {
     pub index: usize,
     /// At least two different points, metres.
     pub point: Vec<Vec3>,
+    /// What it is made of.
+    pub material: Material,
 }
 
 /// Eight strands. Lanes that have no strand, and nodes beyond a strand's tip, are held and weightless.
@@ -42,6 +44,8 @@ pub struct Group {
     pub quiet: [u32; LANES],
     /// Node of each of a strand's points.
     pub at: [Vec<u32>; LANES],
+    /// What each lane's strand is made of.
+    pub material: [Material; LANES],
     /// Springs instead of rods.
     pub springs: Option<Springs>,
     /// How close to the body its points come; empty before the first span.
@@ -113,9 +117,8 @@ pub struct Section {
 }
 
 impl Section {
-    /// Of a layer's material.
-    pub fn new(settings: &Settings) -> Self {
-        let m = &settings.material;
+    /// Of a material.
+    pub fn new(m: &Material) -> Self {
         let area = std::f64::consts::FRAC_PI_4 * m.diameter * m.diameter;
         let second = area * m.diameter * m.diameter / 16.0;
         Section {
@@ -169,6 +172,9 @@ impl Group {
             level: [0; LANES],
             quiet: [0; LANES],
             at: Default::default(),
+            material: std::array::from_fn(|l| {
+                strands.get(l).or(strands.first()).map_or_else(Material::default, |s| s.material)
+            }),
             springs: None,
             keep: Keep::default(),
             clamp: Default::default(),
@@ -228,7 +234,7 @@ impl Group {
     }
 
     fn put(&mut self, lane: usize, s: &Strand, before: usize, settings: &Settings) {
-        let section = Section::new(settings);
+        let section = Section::new(&s.material);
         let k = s.point.len();
         let ends = [s.point[0] - (s.point[1] - s.point[0]), s.point[k - 1] + (s.point[k - 1] - s.point[k - 2])];
         let mut point = s.point.clone();

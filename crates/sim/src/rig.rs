@@ -210,10 +210,20 @@ impl Rig {
 
     /// The same under any gravity.
     pub fn under(hairs: &[Vec<[f64; 3]>], settings: &Settings, gravity: [f64; 3]) -> Result<Rig, SimError> {
+        Rig::made_of(&[], hairs, settings, gravity)
+    }
+
+    /// The same of hairs with materials of their own.
+    pub fn made_of(
+        material: &[Material],
+        hairs: &[Vec<[f64; 3]>],
+        settings: &Settings,
+        gravity: [f64; 3],
+    ) -> Result<Rig, SimError> {
         let offsets = Offsets::from_counts(hairs.iter().map(Vec::len));
         let id: Vec<StrandId> = (1..=hairs.len() as u64).collect();
         let position = hairs.concat();
-        let input = Hairs { offsets: &offsets, position: &position, id: &id };
+        let input = Hairs { offsets: &offsets, position: &position, id: &id, material };
         let (sim, started) = Simulation::new(&input, settings, gravity)?;
         let roots = hairs.iter().map(|h| placed(h[0])).collect();
         let tips = (settings.tip != End::Free).then(|| hairs.iter().map(|h| placed(h[h.len() - 1])).collect());

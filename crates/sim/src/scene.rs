@@ -185,8 +185,7 @@ impl Around for Scene<'_> {
     }
 
     fn air(&self, g: &Group, lanes: [bool; LANES], at: Interval, air: &mut [Air]) -> bool {
-        let factor = self.settings.material.drag_factor;
-        if factor == 0.0 {
+        if g.material.iter().all(|m| m.drag_factor == 0.0) {
             return false;
         }
         let (fraction, ahead) = (at.start + 0.5 * at.length, 0.5 * at.length * at.span);
@@ -197,7 +196,8 @@ impl Around for Scene<'_> {
         let mut point: Vec<Vec3> = Vec::new();
         let mut blowing = vec![Vec3::zeros(); g.node.len()];
         for l in (0..LANES).filter(|&l| lanes[l] && g.strand[l].is_some()) {
-            let at = &g.at[l];
+            let (at, material) = (&g.at[l], &g.material[l]);
+            let factor = material.drag_factor;
             let n = at.len();
             point.clear();
             point.extend(at.iter().map(|&i| g.x(i as usize, l) + g.v(i as usize, l) * ahead));
@@ -223,7 +223,7 @@ impl Around for Scene<'_> {
                 let u = g.v(i, l) + g.a(i, l) * ahead - blowing[k];
                 let along = t.dot(&u);
                 let across = (u - t * along).norm();
-                let d = drag::drag(&still, self.settings.material.diameter, length, across, along.abs());
+                let d = drag::drag(&still, material.diameter, length, across, along.abs());
                 for c in 0..3 {
                     air[i].velocity[c].0[l] = blowing[k][c];
                     air[i].tangent[c].0[l] = t[c];

@@ -133,31 +133,41 @@ impl Settings {
 
     /// Checks the ranges.
     pub fn check(&self) -> Result<(), SimError> {
-        let m = &self.material;
-        let positive = |name, value: f64| {
-            let ok = value.is_finite() && value > 0.0;
-            if ok { Ok(()) } else { Err(SimError::Setting { name, value, expected: "a number above 0" }) }
-        };
-        let at_least_0 = |name, value: f64| {
-            let ok = value.is_finite() && value >= 0.0;
-            if ok { Ok(()) } else { Err(SimError::Setting { name, value, expected: "a number of at least 0" }) }
-        };
-        positive("diameter", m.diameter)?;
-        positive("young", m.young)?;
-        positive("density", m.density)?;
-        positive("bend_factor", m.bend_factor)?;
-        positive("twist_factor", m.twist_factor)?;
-        positive("stretch_factor", m.stretch_factor)?;
-        at_least_0("drag_factor", m.drag_factor)?;
-        at_least_0("damping", m.damping)?;
-        if !(m.poisson > -1.0 && m.poisson <= 0.5) {
-            return Err(SimError::Setting { name: "poisson", value: m.poisson, expected: "above -1 and at most 0.5" });
-        }
+        self.material.check()?;
         positive("tolerance", self.tolerance)?;
         positive("largest_turn", self.largest_turn)?;
         positive("strain_limit", self.strain_limit)?;
         positive("teleport", self.teleport)?;
         at_least_0("friction", self.friction)?;
         at_least_0("offset", self.offset)
+    }
+}
+
+fn positive(name: &'static str, value: f64) -> Result<(), SimError> {
+    let ok = value.is_finite() && value > 0.0;
+    if ok { Ok(()) } else { Err(SimError::Setting { name, value, expected: "a number above 0" }) }
+}
+
+fn at_least_0(name: &'static str, value: f64) -> Result<(), SimError> {
+    let ok = value.is_finite() && value >= 0.0;
+    if ok { Ok(()) } else { Err(SimError::Setting { name, value, expected: "a number of at least 0" }) }
+}
+
+impl Material {
+    /// Checks the ranges.
+    pub fn check(&self) -> Result<(), SimError> {
+        positive("diameter", self.diameter)?;
+        positive("young", self.young)?;
+        positive("density", self.density)?;
+        positive("bend_factor", self.bend_factor)?;
+        positive("twist_factor", self.twist_factor)?;
+        positive("stretch_factor", self.stretch_factor)?;
+        at_least_0("drag_factor", self.drag_factor)?;
+        at_least_0("damping", self.damping)?;
+        if !(self.poisson > -1.0 && self.poisson <= 0.5) {
+            let expected = "above -1 and at most 0.5";
+            return Err(SimError::Setting { name: "poisson", value: self.poisson, expected });
+        }
+        Ok(())
     }
 }

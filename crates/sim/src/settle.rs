@@ -10,7 +10,7 @@ use crate::band::{self, Column, Panel, RING, Window};
 use crate::group::{Group, Section, Strand};
 use crate::lanes::{self, Kernel, LANES, Lanes, Pack, Width};
 use crate::rod::{self, Damping, Scratch};
-use crate::settings::{End, Model, Settings};
+use crate::settings::{End, Material, Model, Settings};
 use crate::springs::calibrate::{self, Calibration};
 use crate::springs::layout::{self, Layout};
 use crate::springs::plain::Model as Springs;
@@ -43,10 +43,10 @@ pub struct Figures {
 
 /// Packs a group, finds its natural shape, and lets it stand.
 pub fn prepare(strands: &[Strand], settings: &Settings, gravity: [f64; 3]) -> (Group, Figures) {
-    let section = Section::new(settings);
     let g = Vec3::from(gravity).norm();
     let mut figures = Figures::default();
     for s in strands {
+        let section = Section::new(&s.material);
         let length: f64 = s.point.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
         figures.gamma = figures.gamma.max(section.mass * g * length.powi(3) / section.bend);
         for w in s.point.windows(3) {
@@ -126,16 +126,16 @@ fn stiffen(group: &mut Group, width: Width, settle: impl Fn(&mut Group)) -> ([f6
 }
 
 /// Particles of a strand of springs; `None` where a segment is far shorter than the others.
-pub fn layout(points: &[Vec3], settings: &Settings) -> Option<Layout> {
+pub fn layout(points: &[Vec3], material: &Material, settings: &Settings) -> Option<Layout> {
     let ends = [settings.root, settings.tip];
     match settings.model {
         Model::Paper => layout::only_straight(points, ends),
-        _ => layout::zigzag(points, ends, calibration(settings).height),
+        _ => layout::zigzag(points, ends, calibration(material).height),
     }
 }
 
-fn calibration(settings: &Settings) -> Calibration {
-    let section = calibrate::Section::round(&settings.material);
+fn calibration(material: &Material) -> Calibration {
+    let section = calibrate::Section::round(material);
     calibrate::calibrate(section.twisting / section.bending)
 }
 
@@ -147,10 +147,12 @@ fn prepare_springs(
     sag_free: bool,
     figures: &mut Figures,
 ) -> Group {
-    let section = calibrate::Section::round(&settings.material);
-    let calibration = calibration(settings);
-    let layouts: Vec<Layout> = strands.iter().map(|s| layout(&s.point, settings).expect("checked before")).collect();
-    let mut models: Vec<Springs> = layouts.iter().map(|l| Springs::new(l, &section, &calibration)).collect();
+    let layout = |s: &Strand| layout(&s.point, &s.material, settings).expect("checked before");
+    let layouts: Vec<Layout> = strands.iter().map(layout).collect();
+    let model = |(s, l): (&Strand, &Layout)| {
+        Springs::new(l, &calibrate::Section::round(&s.material), &calibration(&s.material))
+    };
+    let mut models: Vec<Springs> = strands.iter().zip(&layouts).map(model).collect();
     if sag_free {
         for ((s, model), layout) in strands.iter().zip(&mut models).zip(&layouts) {
             let sagged = sag::without_sag(model, &layout.position, Vec3::from(gravity));

@@ -8,7 +8,7 @@ use crate::nine_steps;
 use crate::place;
 use crate::rod::{self, Damping};
 use crate::scene::{self, Calm, Scene};
-use crate::settings::{Model, Settings};
+use crate::settings::{Material, Model, Settings};
 use crate::settle;
 use crate::stage;
 use crate::{Body, Motion, Rigid, Vec3, Wind};
@@ -25,6 +25,8 @@ pub struct Hairs<'a> {
     pub position: &'a [[f64; 3]],
     /// Names, one a hair.
     pub id: &'a [StrandId],
+    /// What each is made of; empty if all are of the settings' material, whose damping is that of all in any case.
+    pub material: &'a [Material],
 }
 
 /// A root's placement relative to its rest pose, in the coordinates of [`Span::motion`].
@@ -200,6 +202,7 @@ impl Simulation {
     pub fn new(hairs: &Hairs<'_>, settings: &Settings, gravity: [f64; 3]) -> Result<(Self, Started), SimError> {
         settings.check()?;
         scene::finite("gravity", &gravity)?;
+        hairs.material.iter().try_for_each(Material::check)?;
         let mut counts = Vec::new();
         let (mut pick, mut strands, mut rider) = (Vec::new(), Vec::new(), Vec::new());
         let mut root = Vec::new();
@@ -219,11 +222,12 @@ impl Simulation {
                 pick.push(own.len() as u32 - 1);
             }
             // Springs need segments of like length.
+            let material = hairs.material.get(h).unwrap_or(&settings.material);
             let springs = settings.model != Model::Rod && own.len() >= 2;
-            if own.len() < 2 || (springs && settle::layout(&own, settings).is_none()) {
+            if own.len() < 2 || (springs && settle::layout(&own, material, settings).is_none()) {
                 rider.push(Rider { index: h, point: points });
             } else {
-                strands.push(Strand { index: h, point: own });
+                strands.push(Strand { index: h, point: own, material: *material });
             }
         }
         // Strands of like length share a group, so that little is padded; those that never twist have their own. Of these,

@@ -19,7 +19,7 @@ fn bad_input_is_told_by_hair_and_point() {
     let mut hairs = tuft();
     hairs[2][3][1] = f64::NAN;
     let (offsets, position) = (Offsets::from_counts(hairs.iter().map(Vec::len)), hairs.concat());
-    let input = Hairs { offsets: &offsets, position: &position, id: &[1, 2, 3, 4, 5] };
+    let input = Hairs { offsets: &offsets, position: &position, id: &[1, 2, 3, 4, 5], material: &[] };
     let error = Simulation::new(&input, &Settings::default(), GRAVITY).unwrap_err();
     assert!(error.to_string().contains("hair 2, point 3"), "{error}");
     for density in [0.0, -0.0] {
@@ -31,7 +31,7 @@ fn bad_input_is_told_by_hair_and_point() {
 #[test]
 fn nothing_to_do_and_stopping() {
     let offsets = Offsets::from_counts(std::iter::empty());
-    let none = Hairs { offsets: &offsets, position: &[], id: &[] };
+    let none = Hairs { offsets: &offsets, position: &[], id: &[], material: &[] };
     let (mut sim, started) = Simulation::new(&none, &Settings::default(), GRAVITY).unwrap();
     assert_eq!(started.particles, 0);
     let span = |roots: &'static [Root]| Span {

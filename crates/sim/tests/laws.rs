@@ -402,3 +402,39 @@ fn hair_turned_as_a_whole_moves_turned() {
         }
     }
 }
+
+#[test]
+fn hair_of_a_material_of_its_own_moves_as_in_a_layer_of_it() {
+    let soft = Material { damping: 1e-3, ..Material::default() };
+    let kinds = [
+        soft,
+        Material { diameter: 120e-6, bend_factor: 3.0, drag_factor: 0.5, ..soft },
+        Material { young: 1e9, density: 2000.0, twist_factor: 0.2, stretch_factor: 0.5, drag_factor: 4.0, ..soft },
+    ];
+    // Arcs of several lengths, so that groups mix kinds and sizes.
+    let arc = |h: usize| {
+        let length = 0.1 + 0.01 * (h % 5) as f64;
+        let at = |k: usize| 1.5 * k as f64 / 12.0;
+        let point = |k| [length * libm::sin(at(k)) / 1.5, 0.02 * h as f64, length * (1.0 - libm::cos(at(k))) / 1.5];
+        (0..=12).map(point).collect()
+    };
+    let hairs: Vec<Vec<[f64; 3]>> = (0..20).map(arc).collect();
+    let own: Vec<Material> = (0..hairs.len()).map(|h| kinds[h % 3]).collect();
+    for model in MODELS {
+        let settings = |material| Settings { model, material, ..Settings::default() };
+        let moved = |rig: Result<Rig, _>| {
+            let mut rig: Rig = rig.unwrap();
+            let motion = |f: f64| Rigid { translation: [0.02 * f, 0.0, 0.0], ..turned(Vec3::z(), 0.1 * f) };
+            (0..6).for_each(|_| rig.go(1.0 / 24.0, &motion, &Body::default(), None).unwrap());
+            rig
+        };
+        let mixed = moved(Rig::made_of(&own, &hairs, &settings(Material { bend_factor: 9.0, ..soft }), GRAVITY));
+        let layers: Vec<Rig> = kinds.iter().map(|m| moved(Rig::new(&hairs, &settings(*m)))).collect();
+        for h in 0..hairs.len() {
+            assert_eq!(mixed.hair(h), layers[h % 3].hair(h), "{model:?}, hair {h}");
+            assert_ne!(mixed.hair(h), layers[(h + 1) % 3].hair(h), "{model:?}, hair {h}");
+        }
+        let none = [Material { density: 0.0, ..soft }];
+        assert!(Rig::made_of(&none, &hairs[..1], &settings(soft), GRAVITY).is_err());
+    }
+}

@@ -160,25 +160,32 @@ pub struct GuideField {
     /// Dividers: hair rooted on one side of their borders sees only the primitives positioned on that side, but for
     /// those that act `across`.
     pub dividers: Vec<Region>,
+    /// Factors on the strength of each primitive, \[hairs that are traced\]; without, or empty, 1 for all.
+    pub factor: Vec<Vec<f32>>,
 }
 
 impl GuideField {
-    /// The primitives that act on a hair rooted at a point.
-    pub fn seen_from(&self, root: Vec3) -> Vec<&Primitive> {
+    /// The primitives that act on a hair rooted at a point, by number.
+    pub fn seen_from(&self, root: Vec3) -> Vec<usize> {
         let same_side = |p: &Primitive| self.dividers.iter().all(|d| d.contains(root) == d.contains(p.position));
         let reaches = |p: &Primitive| p.domain.is_empty() || p.domain.iter().any(|d| d.contains(root));
-        self.primitives.iter().filter(|p| reaches(p) && (p.across || same_side(p))).collect()
+        let acts = |p: &Primitive| reaches(p) && (p.across || same_side(p));
+        (0..self.primitives.len()).filter(|k| acts(&self.primitives[*k])).collect()
     }
 
     /// The vector at a point for a hair rooted at `root`: the sum over what it sees.
     pub fn vector(&self, root: Vec3, at: Vec3) -> Vec3 {
-        self.seen_from(root).iter().fold(Vec3::zeros(), |v, p| v + p.vector(at))
+        self.seen_from(root).into_iter().fold(Vec3::zeros(), |v, k| v + self.primitives[k].vector(at))
     }
 
     /// Guide hairs from every start.
     pub fn trace(&self, starts: &[Start], settings: &Trace, guard: Option<&Guard>) -> Lines {
-        let seen: Vec<Vec<&Primitive>> = starts.par_iter().map(|s| self.seen_from(s.at)).collect();
-        let field = |h: usize, at: Vec3| seen[h].iter().fold(Vec3::zeros(), |v, p| v + p.vector(at));
+        let factor = |k: usize, h: usize| self.factor.get(k).and_then(|f| f.get(h)).map_or(1.0, |f| f64::from(*f));
+        let seen = |(h, s): (usize, &Start)| -> Vec<(&Primitive, f64)> {
+            self.seen_from(s.at).into_iter().map(|k| (&self.primitives[k], factor(k, h))).collect()
+        };
+        let seen: Vec<_> = starts.par_iter().enumerate().map(seen).collect();
+        let field = |h: usize, at: Vec3| seen[h].iter().fold(Vec3::zeros(), |v, (p, f)| v + p.vector(at) * *f);
         trace(field, starts, settings, guard)
     }
 }
@@ -242,12 +249,20 @@ mod tests {
                 Primitive { position: Vec3::x(), across: true, strength: -3.0, ..constant(Vec3::y() * 7.0) },
             ],
             dividers: vec![Region::HalfSpace { point: Vec3::zeros(), normal: Vec3::x() }],
+            ..GuideField::default()
         };
         let starts = [start(Vec3::new(0.01, 1.0, 0.0), 2.0), start(Vec3::new(-0.01, 1.0, 0.0), 2.0)];
         let lines = field.trace(&starts, &TRACE, None);
         let down = (Vec3::x() - Vec3::y() * 3.0).normalize() * 2.0;
         assert!((lines.at[30] - starts[0].at - down).norm() < 1e-12);
         assert!((lines.line(1)[30] - starts[1].at - Vec3::new(-down.x, down.y, 0.0)).norm() < 1e-12);
+        // Painted strengths: the first hair sees half of the third, the second nothing of its own.
+        field.factor = vec![vec![], vec![1.0, 0.0], vec![0.5, 1.0]];
+        let lines = field.trace(&starts, &TRACE, None);
+        let half = (Vec3::x() - Vec3::y() * 1.5).normalize() * 2.0;
+        assert!((lines.line(0)[30] - starts[0].at - half).norm() < 1e-12);
+        assert!((lines.line(1)[30] - starts[1].at + Vec3::y() * 2.0).norm() < 1e-12);
+        field.factor.clear();
         let ball = |x: f64| Region::Ellipsoid {
             centre: Vec3::x() * x,
             rotation: UnitQuaternion::from_euler_angles(0.0, 0.0, std::f64::consts::FRAC_PI_2),

@@ -105,7 +105,7 @@ mod tests {
     use std::f64::consts::{PI, TAU};
 
     fn hair(orientation: Orientation, at: Vec3, length: f64) -> Vec<Vec3> {
-        let field = GuideField { primitives: vec![Primitive::new(orientation)], dividers: Vec::new() };
+        let field = GuideField { primitives: vec![Primitive::new(orientation)], ..GuideField::default() };
         let settings = Trace { points: 401, step: 0.0, reverse: false, slow: 0.0 };
         field.trace(&[Start { at, direction: Vec3::y(), length }], &settings, None).at
     }

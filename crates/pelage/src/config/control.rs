@@ -3,6 +3,7 @@
 use super::GroomFile;
 use super::document::{ConfigError, Document, exactly};
 use super::groom::{Feature, points, some_points};
+use super::look_value::{LookValue, varied};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::path::PathBuf;
@@ -75,7 +76,7 @@ pub struct ControlHair {
 #[serde(deny_unknown_fields)]
 pub struct Placement {
     /// Control hairs per square centimetre of skin.
-    pub per_cm2: Option<f64>,
+    pub per_cm2: Option<LookValue>,
     /// Counts along u and along v, on every chart.
     #[serde(default, deserialize_with = "grid")]
     pub grid: Option<[usize; 2]>,
@@ -141,8 +142,13 @@ impl Document<GroomFile> {
                 None => h.root.into_iter().try_for_each(|x| self.within(&format!("{at}.root"), x, -1e9, 1e9))?,
             }
         }
-        if let Some(d) = p.per_cm2 {
-            self.within("control.placement.per_cm2", d, 0.0, 1e4)?;
+        if let Some(d) = &p.per_cm2 {
+            let key = "control.placement.per_cm2";
+            self.check_value(key, &varied("", d, [0.0, 1e4]))?;
+            self.still(key, d)?;
+            if d.varies() && p.relax > 0 {
+                return Err(self.error(key, "varies, and `relax` evens it out", "take one of the two out"));
+            }
         }
         if let Some(g) = p.grid.filter(|g| g.iter().any(|n| !(1..=4096).contains(n))) {
             let what = format!("{} x {} is out of range", g[0], g[1]);

@@ -6,6 +6,7 @@ use super::control::Control;
 use super::document::{ConfigError, Document, Fixed, exactly};
 use super::keys::ROOTED;
 use super::look::{Clump, Collision, Curl, Emitter, Noise, Operator, Wave, WindLook};
+use super::look_value::{LookValue, varied};
 use super::simulate::{Material, Target, check_material};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer};
@@ -217,7 +218,7 @@ impl ColorFeature {
 #[serde(deny_unknown_fields)]
 pub struct Guard {
     /// Share of the layer's hairs that are guard hairs, 0 to 1. More keeps those that were.
-    pub percent: f64,
+    pub percent: LookValue,
     /// Factor on their length. Default: 1.5.
     #[serde(default = "longer")]
     pub length: f64,
@@ -449,8 +450,11 @@ impl Document<GroomFile> {
             }
         }
         if let Some(g) = &l.guard {
-            for (name, x, most) in [("percent", g.percent, 1.0), ("length", g.length, 1e3), ("width", g.width, 1e3)] {
-                self.within(&format!("{key}.guard.{name}"), x, 0.0, most)?;
+            let percent = format!("{key}.guard.percent");
+            self.check_value(&percent, &varied("", &g.percent, [0.0, 1.0]))?;
+            self.still(&percent, &g.percent)?;
+            for (name, x) in [("length", g.length), ("width", g.width)] {
+                self.within(&format!("{key}.guard.{name}"), x, 0.0, 1e3)?;
             }
         }
         check_material(self, &format!("{key}.material"), &l.material)?;

@@ -46,8 +46,8 @@ pub struct Primitive {
     #[serde(default, deserialize_with = "exactly")]
     pub turn: [f64; 3],
     /// Strength against the others; negative turns it round. Default: 1.
-    #[serde(default = "unit")]
-    pub strength: f64,
+    #[serde(default = "super::look::one", skip_serializing)]
+    pub strength: LookValue,
     /// How the strength falls with distance from the origin, or from the line. Default: it doesn't.
     pub falloff: Option<Falloff>,
     /// Lengths of its axes that count as distance 1, scene units. Default: 1, 1, 1.
@@ -333,10 +333,11 @@ impl Document<GroomFile> {
             self.within(&format!("{key}.{name}"), x.unwrap_or(1.0), 1e-9, 1e9)?;
         }
         self.within(&format!("{key}.pitch"), p.pitch.unwrap_or(0.0), -1e9, 1e9)?;
-        let numbers = [("amplitude", p.amplitude), ("phase", p.phase), ("strength", Some(p.strength))];
+        let numbers = [("amplitude", p.amplitude), ("phase", p.phase)];
         numbers
             .into_iter()
             .try_for_each(|(name, x)| self.within(&format!("{key}.{name}"), x.unwrap_or(0.0), -1e9, 1e9))?;
+        self.check_value(&format!("{key}.strength"), &varied("", &p.strength, [-1e9, 1e9]))?;
         for (name, v) in [("position", p.position), ("turn", p.turn)] {
             v.into_iter().try_for_each(|x| self.within(&format!("{key}.{name}"), x, -1e9, 1e9))?;
         }

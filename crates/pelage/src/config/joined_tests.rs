@@ -28,7 +28,7 @@ fn a_file_lies_on_top_of_what_it_includes() {
         [style.thick]\nlike = \"long\"\nwidth = { value = 90.0 }\n[style.long]\nlength = { value = 9.0 }\nwidth = { value = 1.0 }\n";
     let (doc, dir) = read(&[("base/hair.toml", BASE), ("top.toml", top)]).expect("sound files");
     let groom = &doc.value;
-    assert_eq!(groom.control.placement.per_cm2, Some(1.0));
+    assert_eq!(groom.control.placement.per_cm2.as_ref().map(|d| d.at(0.0)), Some(1.0));
     // Operations go on, layers of one name are one.
     assert_eq!(groom.comb.len(), 2);
     assert_eq!(groom.comb[1].angle.as_ref().map(|v| v.at(0.0)), Some(3.0));
@@ -84,7 +84,7 @@ fn presets_are_there() {
     let text = BASE.replace("name = \"a\"\n", "name = \"a\"\nlike = [\"coarse-hair\", \"auburn\"]\n");
     let (doc, _dir) = read(&[("t.toml", &text)]).expect("a sound file");
     let layer = &doc.value.layer[0];
-    assert_eq!((layer.material.diameter, layer.width.value, layer.width.tip), (95.0, 70.0, Some(0.5)));
+    assert_eq!((layer.material.diameter.at(0.0), layer.width.value, layer.width.tip), (95.0, 70.0, Some(0.5)));
     assert_eq!(layer.color.value[1], 0.055);
     assert!(doc.check().is_ok());
 }

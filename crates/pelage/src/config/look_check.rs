@@ -2,8 +2,33 @@
 
 use super::document::{ConfigError, Document};
 use super::keyed::{Keyed, Vector};
-use super::look_value::{Varied, varied};
+use super::look_value::{LookValue, Varied, varied};
 use super::{Clump, ClumpOf, Curl, CurlKind, GroomFile, Layer, Operator};
+
+impl<T> Document<T> {
+    /// Complains about key frames of what is made once.
+    pub(super) fn still(&self, at: &str, v: &LookValue) -> Result<(), ConfigError> {
+        match v.0.value.0.len() {
+            1 => Ok(()),
+            _ => Err(self.error(at, "can't have key frames", "it is the same in all frames; give a number")),
+        }
+    }
+
+    /// Checks a value, its key frames and how it varies.
+    pub(super) fn check_value(&self, at: &str, v: &Varied<'_>) -> Result<(), ConfigError> {
+        for k in &v.value.0.value.0 {
+            self.within(at, k.value, v.range[0], v.range[1])?;
+            self.within(at, k.frame, -1e9, 1e9)?;
+        }
+        self.check_keys(at, &v.value.0.value)?;
+        self.within(&format!("{at}.noise"), v.value.0.noise, 0.0, if v.added { 1e3 } else { 1.0 })?;
+        for s in &v.value.0.vary {
+            self.within(&format!("{at}.vary"), s.size, 1e-9, 1e9)?;
+            self.within(&format!("{at}.vary"), s.deviation, 0.0, 1e3)?;
+        }
+        Ok(())
+    }
+}
 
 impl Document<GroomFile> {
     pub(super) fn check_look(&self, at: &str, l: &Layer) -> Result<(), ConfigError> {
@@ -68,20 +93,6 @@ impl Document<GroomFile> {
         self.within(&format!("{at}.collision.clearance"), l.collision.clearance, 1e-4, 1e3)?;
         self.within(&format!("{at}.collision.held"), l.collision.held, 1e-4, 1e6)?;
         self.check_order(at, l)
-    }
-
-    pub(super) fn check_value(&self, at: &str, v: &Varied<'_>) -> Result<(), ConfigError> {
-        for k in &v.value.0.value.0 {
-            self.within(at, k.value, v.range[0], v.range[1])?;
-            self.within(at, k.frame, -1e9, 1e9)?;
-        }
-        self.check_keys(at, &v.value.0.value)?;
-        self.within(&format!("{at}.noise"), v.value.0.noise, 0.0, if v.added { 1e3 } else { 1.0 })?;
-        for s in &v.value.0.vary {
-            self.within(&format!("{at}.vary"), s.size, 1e-9, 1e9)?;
-            self.within(&format!("{at}.vary"), s.deviation, 0.0, 1e3)?;
-        }
-        Ok(())
     }
 
     /// Parameters of what is handed to the simulation.

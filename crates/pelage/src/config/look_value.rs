@@ -71,6 +71,11 @@ impl LookValue {
         self.0.map.clone().map(|map| MapRef { map, channel: self.0.channel, wrap: self.0.wrap })
     }
 
+    /// True if it is not the same for all hairs.
+    pub fn varies(&self) -> bool {
+        self.0.map.is_some() || self.0.noise != 0.0 || !self.0.vary.is_empty()
+    }
+
     /// True if it is 0 at all times.
     pub fn is_zero(&self) -> bool {
         self.0.value.0.iter().all(|k| k.value == 0.0)

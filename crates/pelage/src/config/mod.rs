@@ -36,7 +36,9 @@ pub use look_value::{LookValue, Varied, VariedValue, VaryScale};
 pub use preview::{CameraSettings, Preview, PreviewTone, Shade};
 pub use shot::{CacheSettings, Export, ExportFormat, GroomRef, Look, LookOverride, Shot, ShotFile, Skin, UpAxis};
 pub use simulate::{BodyKind, BodyMesh, BodySettings};
-pub use simulate::{Material, Quality, SEGMENTS, Simulate, StrandModel, Target, WindSettings, check_material};
+pub use simulate::{
+    Material, Quality, SEGMENTS, Simulate, StrandModel, Target, WindSettings, check_material, check_material_value,
+};
 pub use skip::Skip;
 
 /// JSON Schema (draft 2020-12) of a shot file or a groom file, for editors.

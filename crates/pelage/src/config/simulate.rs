@@ -3,6 +3,7 @@
 use super::ShotFile;
 use super::document::{ConfigError, Document, Fixed, exactly};
 use super::keyed::{Amount, Key, Keyed, Vector};
+use super::look_value::{LookValue, varied};
 use schemars::JsonSchema;
 use serde::de::Deserializer;
 use serde::{Deserialize, Serialize};
@@ -280,91 +281,110 @@ impl BodyKind {
 #[serde(deny_unknown_fields, default)]
 pub struct Material {
     /// Diameter of the simulated hair, micrometres; the render width is another matter. Default: 70.
-    pub diameter: f64,
+    pub diameter: LookValue,
     /// Young's modulus, gigapascals. Default: 3.9.
-    pub young_gpa: f64,
+    pub young_gpa: LookValue,
     /// Poisson's ratio. Default: 0.3.
     pub poisson: f64,
     /// Density, kg/m3. Default: 1300.
-    pub density: f64,
+    pub density: LookValue,
     /// Internal damping: relaxation time of bending and twisting, seconds. Default: 0.002.
     pub damping: f64,
     /// Factor on bending stiffness. Default: 1.
-    pub bend_factor: f64,
+    pub bend_factor: LookValue,
     /// Factor on twisting stiffness. Default: 1.
-    pub twist_factor: f64,
+    pub twist_factor: LookValue,
     /// Factor on stretching stiffness. Default: 1.
-    pub stretch_factor: f64,
+    pub stretch_factor: LookValue,
     /// Factor on the drag of the air. Default: 1.
-    pub drag_factor: f64,
+    pub drag_factor: LookValue,
 }
 
 impl Default for Material {
     fn default() -> Self {
-        let m = pelage_sim::Material::default();
+        let (m, value) = (pelage_sim::Material::default(), LookValue::constant);
         Material {
-            diameter: 70.0,
-            young_gpa: 3.9,
+            diameter: value(70.0),
+            young_gpa: value(3.9),
             poisson: m.poisson,
-            density: m.density,
+            density: value(m.density),
             damping: m.damping,
-            bend_factor: m.bend_factor,
-            twist_factor: m.twist_factor,
-            stretch_factor: m.stretch_factor,
-            drag_factor: m.drag_factor,
+            bend_factor: value(m.bend_factor),
+            twist_factor: value(m.twist_factor),
+            stretch_factor: value(m.stretch_factor),
+            drag_factor: value(m.drag_factor),
         }
     }
 }
 
 impl Material {
-    /// Every value by its key.
-    pub fn values(&self) -> [(&'static str, f64); 9] {
+    /// Values that may vary from hair to hair, by key.
+    pub fn varied(&self) -> [(&'static str, &LookValue); 7] {
         [
-            ("diameter", self.diameter),
-            ("young_gpa", self.young_gpa),
-            ("poisson", self.poisson),
-            ("density", self.density),
-            ("damping", self.damping),
-            ("bend_factor", self.bend_factor),
-            ("twist_factor", self.twist_factor),
-            ("stretch_factor", self.stretch_factor),
-            ("drag_factor", self.drag_factor),
+            ("diameter", &self.diameter),
+            ("young_gpa", &self.young_gpa),
+            ("density", &self.density),
+            ("bend_factor", &self.bend_factor),
+            ("twist_factor", &self.twist_factor),
+            ("stretch_factor", &self.stretch_factor),
+            ("drag_factor", &self.drag_factor),
         ]
     }
 
-    /// In SI units.
-    pub fn si(&self) -> pelage_sim::Material {
+    /// Values that are the same for all hairs, by key.
+    pub fn even(&self) -> [(&'static str, f64); 2] {
+        [("poisson", self.poisson), ("damping", self.damping)]
+    }
+
+    /// In SI units, each value that varies times a factor: `factor` has them by key.
+    pub fn si(&self, factor: impl Fn(&str) -> f64) -> pelage_sim::Material {
+        let of = |key: &str, v: &LookValue| v.at(0.0) * factor(key);
         pelage_sim::Material {
-            diameter: self.diameter * 1e-6,
-            young: self.young_gpa * 1e9,
+            diameter: of("diameter", &self.diameter) * 1e-6,
+            young: of("young_gpa", &self.young_gpa) * 1e9,
             poisson: self.poisson,
-            density: self.density,
+            density: of("density", &self.density),
             damping: self.damping,
-            bend_factor: self.bend_factor,
-            twist_factor: self.twist_factor,
-            stretch_factor: self.stretch_factor,
-            drag_factor: self.drag_factor,
+            bend_factor: of("bend_factor", &self.bend_factor),
+            twist_factor: of("twist_factor", &self.twist_factor),
+            stretch_factor: of("stretch_factor", &self.stretch_factor),
+            drag_factor: of("drag_factor", &self.drag_factor),
         }
+    }
+}
+
+/// Smallest and largest value of a material's key, and what is usual.
+fn material_range(key: &str) -> (f64, f64, &'static str) {
+    match key {
+        "diameter" => (0.1, 1e5, "human hair has 50 to 100 micrometres"),
+        "young_gpa" => (1e-9, 1e4, "hair has 2 to 6 gigapascals"),
+        "poisson" => (-0.99, 0.5, "hair has 0.3"),
+        "density" => (1e-3, 1e6, "hair has 1300 kg/m3"),
+        "damping" => (0.0, 10.0, "0.002 is usual"),
+        "drag_factor" => (0.0, 1e9, "1 is the drag of a thread of that diameter"),
+        _ => (1e-9, 1e9, "1 is the material as it is"),
     }
 }
 
 /// Checks the material at a key of a file.
 pub fn check_material<T>(doc: &Document<T>, key: &str, m: &Material) -> Result<(), ConfigError> {
-    let ranges = [
-        (0.1, 1e5, "human hair has 50 to 100 micrometres"),
-        (1e-9, 1e4, "hair has 2 to 6 gigapascals"),
-        (-0.99, 0.5, "hair has 0.3"),
-        (1e-3, 1e6, "hair has 1300 kg/m3"),
-        (0.0, 10.0, "0.002 is usual"),
-        (0.0, 1e9, "1 is the material as it is"),
-        (0.0, 1e9, "1 is the material as it is"),
-        (1e-9, 1e9, "1 is the material as it is"),
-        (0.0, 1e9, "1 is the drag of a thread of that diameter"),
-    ];
-    for ((name, x), (low, high, help)) in m.values().into_iter().zip(ranges) {
-        range(doc, &format!("{key}.{name}"), x, low, high, help)?;
+    let even = m.even().map(|(name, x)| (name, vec![x]));
+    let each = m.varied().map(|(name, v)| (name, v.0.value.0.iter().map(|k| k.value).collect()));
+    for (name, x) in even.into_iter().chain(each) {
+        x.into_iter().try_for_each(|x| check_material_value(doc, &format!("{key}.{name}"), x))?;
+    }
+    for (name, v) in m.varied() {
+        let key = format!("{key}.{name}");
+        doc.still(&key, v)?;
+        doc.check_value(&key, &varied("", v, [f64::MIN, f64::MAX]))?;
     }
     Ok(())
+}
+
+/// Checks a value of the material at a key of a file, that of one hair or of all.
+pub fn check_material_value<T>(doc: &Document<T>, key: &str, x: f64) -> Result<(), ConfigError> {
+    let (low, high, help) = material_range(key.rsplit('.').next().unwrap_or(key));
+    range(doc, key, x, low, high, help)
 }
 
 fn range<T>(doc: &Document<T>, key: &str, x: f64, low: f64, high: f64, help: &str) -> Result<(), ConfigError> {
@@ -393,6 +413,10 @@ impl Document<ShotFile> {
         number("checkpoint", f64::from(s.checkpoint), 1.0, 1e6, "24 is usual")?;
         if let Some(material) = &s.material {
             check_material(self, "simulate.material", material)?;
+            if let Some((name, _)) = material.varied().iter().find(|(_, v)| v.varies()) {
+                let help = "give a number; layers of a groom may have maps";
+                return Err(self.error(&format!("simulate.material.{name}"), "can't vary from hair to hair", help));
+            }
         }
         let up = self.value.shot.up;
         self.keys("simulate.gravity", &s.gravity.downward(up), 1e6, "9.81 is the earth's, in m/s2")?;
@@ -493,7 +517,7 @@ mod tests {
 
     #[test]
     fn defaults_are_those_of_the_simulation() {
-        let (m, s) = (Material::default().si(), Simulate::default());
+        let (m, s) = (Material::default().si(|_| 1.0), Simulate::default());
         let d = pelage_sim::Settings::default();
         let close = |a: f64, b: f64| (a - b).abs() <= 1e-12 * b.abs();
         assert!(close(m.diameter, d.material.diameter) && close(m.young, d.material.young));

@@ -22,7 +22,14 @@ pub(super) fn named_maps(groom: &GroomFile) -> Vec<(String, PathBuf)> {
     let mut add = |key: String, map: Option<&PathBuf>| out.extend(map.map(|m| (key, m.clone())));
     add("control.length.map".into(), groom.control.length.as_ref().and_then(|f| f.map.as_ref()));
     add("scalp.coordinates.map".into(), groom.scalp.coordinates.as_ref().map(|m| &m.map));
+    add(
+        "control.placement.per_cm2.map".into(),
+        groom.control.placement.per_cm2.as_ref().and_then(|d| d.0.map.as_ref()),
+    );
     for (i, c) in groom.comb.iter().enumerate() {
+        for (k, p) in c.primitive.iter().enumerate() {
+            add(format!("comb[{i}].primitive[{k}].strength.map"), p.strength.0.map.as_ref());
+        }
         for (key, v) in c.varied() {
             add(format!("comb[{i}].{key}.map"), v.0.map.as_ref());
         }
@@ -38,6 +45,10 @@ pub(super) fn named_maps(groom: &GroomFile) -> Vec<(String, PathBuf)> {
         add(format!("layer[{i}].width.map"), l.width.map.as_ref());
         add(format!("layer[{i}].opacity.map"), l.opacity.map.as_ref());
         add(format!("layer[{i}].color.map"), l.color.map.as_ref());
+        add(format!("layer[{i}].guard.percent.map"), l.guard.as_ref().and_then(|g| g.percent.0.map.as_ref()));
+        for (key, v) in l.material.varied() {
+            add(format!("layer[{i}].material.{key}.map"), v.0.map.as_ref());
+        }
         for (key, v) in l.varied() {
             add(format!("layer[{i}].{key}.{}.map", v.name), v.value.0.map.as_ref());
         }

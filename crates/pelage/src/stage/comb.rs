@@ -72,7 +72,7 @@ fn comb_hairs(run: &mut Runner<'_>, what: What) -> Result<ControlHairs, Error> {
     let millimetre = 1e-3 / project.shot.value.shot.meters_per_unit;
     let clearance = control.clearance * millimetre;
     let guard = Guard { surface: skin.bvh(), clearance };
-    let (guides, points) = (guides::guides(run, what.comb_frame(), &combs, &hairs)?, hairs.points);
+    let (guides, points) = (guides::guides(run, what.comb_frame(), &combs, &hairs, &drawn)?, hairs.points);
     let trace: Vec<_> =
         guides.iter().map(|g| g.as_ref().map(|g| |starts: &[Start]| g.lines(points, &guard, starts))).collect();
     let ops: Vec<CombOp<'_>> = combs

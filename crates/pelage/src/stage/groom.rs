@@ -3,14 +3,17 @@
 use super::run::{Counts, Runner};
 use super::skin::Texel;
 use super::tables::{decode, encode, table, vector_columns, vectors_of};
-use super::{Skin, SkinPose, What};
+use super::{Skin, SkinPose, What, clumps};
 use crate::Error;
+use crate::config::LookValue;
 use crate::curves;
 use crate::format::ply;
 use crate::project::SkinAt;
 use pelage_geom::{Offsets, SurfacePoint, Vec3};
-use pelage_groom::candidates::candidates;
+use pelage_groom::candidates::{candidates, rank};
 use pelage_groom::control::{self, ControlHairs, PartingPiece, Sites};
+use pelage_groom::look::member::rest_sites;
+use pelage_groom::look::vary::Drawn;
 use pelage_groom::place::{Line, PlaceSettings, Placement, Single, place};
 use std::rc::Rc;
 
@@ -105,18 +108,19 @@ pub(super) fn place_hairs(run: &mut Runner<'_>) -> Result<(ControlHairs, Sites, 
     let length_map = length.map().map(|m| run.map(&m, Texel::Value)).transpose()?;
     let partings: Vec<Vec<Vec3>> = partings(run);
     let p = &groom.control.placement;
-    let per_unit2 = p.per_cm2.unwrap_or(0.0) * run.project.cm2_per_unit2();
-    let root: Vec<SurfacePoint> = match p.per_cm2 {
-        Some(_) => {
+    let per_unit2 = p.per_cm2.as_ref().map_or(0.0, |d| d.at(0.0)) * run.project.cm2_per_unit2();
+    let root: Vec<SurfacePoint> = match &p.per_cm2 {
+        Some(density) => {
             let count = (per_unit2 * skin.area()).round() as usize;
             if count > MAX_CONTROL {
                 let what = format!("asks for {count} control hairs on this skin, at most {MAX_CONTROL} are placed");
                 let help = "lower it, or check shot.meters_per_unit";
                 return Err(run.project.groom.error("control.placement.per_cm2", what, help).into());
             }
-            candidates(&skin.mesh, &skin.topology, CONTROL_SEED, count, &mut |_| true)
+            let root = candidates(&skin.mesh, &skin.topology, CONTROL_SEED, count, &mut |_| true)
                 .map(|c| c.root)
-                .unwrap_or_default()
+                .unwrap_or_default();
+            thinned(run, &skin, density, root)?
         }
         None => Vec::new(),
     };
@@ -125,7 +129,7 @@ pub(super) fn place_hairs(run: &mut Runner<'_>) -> Result<(ControlHairs, Sites, 
     // Partings and drawn hairs keep the distance that the density asks for, or half a centimetre.
     let half_cm = 0.5 / run.project.cm2_per_unit2().sqrt();
     let spacing = if per_unit2 > 0.0 { (0.5 / per_unit2.sqrt()).min(2.0 * half_cm) } else { half_cm };
-    let placement = match (&drawn, p.grid, p.per_cm2) {
+    let placement = match (&drawn, p.grid, &p.per_cm2) {
         (Some(drawn), ..) => Placement::Curves { drawn, spacing: 0.1 * half_cm },
         (None, Some([u, v]), _) => Placement::Grid { u, v, even: p.even },
         (None, None, Some(_)) => Placement::PerArea { density: per_unit2, root: &root },
@@ -191,6 +195,28 @@ pub(super) fn place_hairs(run: &mut Runner<'_>) -> Result<(ControlHairs, Sites, 
             .push(format!("drawn hairs were moved onto the skin by {mean:.2} mm on average, {max:.2} mm at most"));
     }
     Ok((hairs, sites, counts))
+}
+
+/// The candidates, in their order, whose rank is below what a density says of its largest there; a density that does not vary
+/// leaves them all.
+fn thinned(
+    run: &mut Runner<'_>,
+    skin: &Skin,
+    density: &LookValue,
+    root: Vec<SurfacePoint>,
+) -> Result<Vec<SurfacePoint>, Error> {
+    if !density.varies() {
+        return Ok(root);
+    }
+    let view = view(skin);
+    let id: Vec<u64> = (0..root.len() as u64).collect();
+    let uv: Vec<[f32; 2]> = root.iter().map(|p| view.uv(p)).collect();
+    let (position, _) = rest_sites(&view, &root, skin.origin());
+    let drawn = Drawn { id: &id, uv: &uv, position: &position, seed: CONTROL_SEED };
+    let share = clumps::column(run, &drawn, "control.placement.per_cm2", density, false)?;
+    let all = root.len() as f64;
+    let grows = |k: usize| rank(k as u64) < f64::from(share[k]) * all;
+    Ok(root.into_iter().enumerate().filter(|(k, _)| grows(*k)).map(|(_, p)| p).collect())
 }
 
 /// The skin at a moment. Layers and stages ask for the same one after another: the last is kept.

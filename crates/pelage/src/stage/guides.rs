@@ -1,5 +1,6 @@
 //! Fields that control hairs are combed along.
 
+use super::clumps::column;
 use super::look::barrier;
 use super::run::{Counts, Runner};
 use super::skin::Texel;
@@ -17,6 +18,7 @@ use pelage_groom::control::ControlHairs;
 use pelage_groom::field::{self, Falloff, GuideField, lengths};
 use pelage_groom::flow::trace::{Guard, Lines, Start, Trace, trace};
 use pelage_groom::flow::{self, Body, Factored, Fast, Grid, OPENING, coarse};
+use pelage_groom::look::vary::Drawn;
 use std::sync::Arc;
 
 /// Cells along the longest side of the box that lines can come to: velocities between are off by 1e-4 in the middle, and more
@@ -60,10 +62,11 @@ pub(super) fn guides(
     frame: Option<i32>,
     combs: &[Comb],
     hairs: &ControlHairs,
+    drawn: &Drawn<'_>,
 ) -> Result<Vec<Option<Guides>>, Error> {
     let each = combs.iter().enumerate();
     each.map(|(i, c)| match c.kind {
-        CombKind::Field => Ok(Some(Guides::Field(field_of(c)))),
+        CombKind::Field => Ok(Some(Guides::Field(field_of(run, i, c, drawn)?))),
         CombKind::Flow => Ok(Some(Guides::Flow(flow_of(run, i, c)?))),
         CombKind::Cluster => {
             let (tree, uv) = (clusters::tree(run, frame)?, clusters::coordinates(run, &hairs.root)?);
@@ -131,11 +134,14 @@ fn vector(v: Option<[f64; 3]>) -> Vec3 {
     Vec3::from(v.unwrap_or_default())
 }
 
-fn field_of(c: &Comb) -> GuideField {
-    GuideField {
+fn field_of(run: &mut Runner<'_>, i: usize, c: &Comb, hairs: &Drawn<'_>) -> Result<GuideField, Error> {
+    let name = |k: usize| format!("comb[{i}].primitive[{k}].strength");
+    let each = c.primitive.iter().enumerate();
+    Ok(GuideField {
         primitives: c.primitive.iter().map(primitive).collect(),
         dividers: c.divider.iter().map(region).collect(),
-    }
+        factor: each.map(|(k, p)| column(run, hairs, &name(k), &p.strength, false)).collect::<Result<_, _>>()?,
+    })
 }
 
 fn primitive(p: &Primitive) -> field::Primitive {
@@ -173,7 +179,7 @@ fn primitive(p: &Primitive) -> field::Primitive {
     field::Primitive {
         position: p.position.into(),
         rotation: turned(p.turn),
-        strength: p.strength,
+        strength: p.strength.at(0.0),
         falloff,
         shape: p.shape.into(),
         domain: p.domain.iter().map(region).collect(),

@@ -4,17 +4,19 @@ use super::plan_kept::hairs_of;
 use super::run::{Counts, Runner};
 use super::skin::Texel;
 use super::tables::{decode, encode, id_columns, ids_of, root_columns, roots_of, table, vector_columns, vectors_of};
-use super::{Skin, What, candidate_density, clusters, comb, groom, guides, kept, layer_seed};
+use super::{Skin, What, candidate_density, clumps, clusters, comb, groom, guides, kept, layer_seed};
 use crate::Error;
 use crate::config::{Feature, Guard, GuideChoice};
 use crate::format::ply::Column;
 use pelage_geom::{StrandId, SurfacePoint, TiledMap, rng};
 use pelage_groom::candidates::{Candidates, candidates as find_candidates, strand_id};
 use pelage_groom::choose::{self, respect};
+use pelage_groom::comb::Amount;
 use pelage_groom::control::ControlHairs;
 use pelage_groom::instance::{Density, Feature as FeatureSource, Roots, colour_column, feature_column, scale_guards};
 use pelage_groom::instance::{roots as find_roots, weights as find_weights};
 use pelage_groom::keep::kept as kept_roots;
+use pelage_groom::look::vary::Drawn;
 use pelage_groom::triangulate::{mirrored_charts, triangulate};
 use std::rc::Rc;
 
@@ -322,7 +324,7 @@ pub fn column(run: &mut Runner<'_>, what: What, i: usize) -> Result<Vec<f32>, Er
 /// A column of one number for some of a layer's hairs.
 pub(super) fn feature(run: &mut Runner<'_>, what: What, i: usize, roots: &Roots) -> Result<Vec<f32>, Error> {
     let layer = &run.project.groom.value.layer[i];
-    let guard = |factor: fn(&Guard) -> f64| layer.guard.as_ref().map(|g| (g.percent, factor(g) as f32));
+    let guard = |factor: fn(&Guard) -> f64| layer.guard.as_ref().map(|g| factor(g) as f32);
     let (name, feature, guard) = match what {
         What::Length(_) => ("length", layer.length.clone(), guard(|g| g.length)),
         What::Width(_) => ("width", layer.width.feature(), guard(|g| g.width)),
@@ -343,10 +345,23 @@ pub(super) fn feature(run: &mut Runner<'_>, what: What, i: usize, roots: &Roots)
         let own = |id: &StrandId| control.length(by_hand(&control, *id)) as f32;
         values.iter_mut().zip(&roots.id).for_each(|(value, id)| *value *= own(id));
     }
-    if let Some((share, factor)) = guard {
-        scale_guards(&mut values, roots, share, factor, seed);
+    if let Some(factor) = guard {
+        let (value, varies) = guard_share(run, i, roots)?;
+        scale_guards(&mut values, roots, Amount { value, factor: &varies }, factor, seed);
     }
     Ok(values)
+}
+
+/// The share of a layer's hairs that are guard hairs, and factors on it from hair to hair.
+pub(super) fn guard_share(run: &mut Runner<'_>, i: usize, roots: &Roots) -> Result<(f64, Vec<f32>), Error> {
+    let layer = &run.project.groom.value.layer[i];
+    let percent = &layer.guard.as_ref().expect("the layer has guard hairs").percent;
+    let position = match percent.0.vary.is_empty() {
+        true => Vec::new(),
+        false => clumps::sites(run, i)?.position.clone(),
+    };
+    let hairs = Drawn { id: &roots.id, uv: &roots.uv, position: &position, seed: u64::from(layer_seed(&layer.name)) };
+    Ok((percent.at(0.0), clumps::column(run, &hairs, "guard.percent", percent, false)?))
 }
 
 /// Linear colour of every hair.

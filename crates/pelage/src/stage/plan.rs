@@ -463,10 +463,9 @@ impl<'a> Reader<'a> {
             "width" => g.width,
             _ => return r,
         };
-        for (key, value) in [("percent", g.percent), (part, factor)] {
-            r = r.param(&format!("guard.{key}"), value, self.in_groom(&format!("layer[{i}].guard.{key}")));
-        }
-        r
+        let at = format!("layer[{i}].guard");
+        r = r.with(self.value("guard.percent", &format!("{at}.percent"), &g.percent, 0.0));
+        r.param(&format!("guard.{part}"), factor, self.in_groom(&format!("{at}.{part}")))
     }
 
     /// What makes columns of points of a layer's columns of hairs: it is read where points are written or drawn.

@@ -12,8 +12,8 @@ impl Reader<'_> {
         let mut r = self.unit(self.rest(Recipe::new("groom/place", version::PLACE)));
         let p = &control.placement;
         let at = self.in_groom("control.placement");
-        if let Some(d) = p.per_cm2 {
-            r = r.param("per_cm2", d, format!("{at}.per_cm2"));
+        if let Some(d) = &p.per_cm2 {
+            r = r.with(self.value("per_cm2", "control.placement.per_cm2", d, 0.0));
         }
         if let Some([u, v]) = p.grid {
             r = r.param("grid", format!("{u} x {v}"), format!("{at}.grid"));
@@ -143,6 +143,10 @@ impl Reader<'_> {
     fn comb_guides(&self, mut r: Recipe, i: usize, c: &Comb) -> Recipe {
         let at = |key: &str| format!("comb[{i}].{key}");
         r = self.plain(r, &at("primitive"), &c.primitive);
+        for (k, p) in c.primitive.iter().enumerate() {
+            let name = at(&format!("primitive[{k}].strength"));
+            r = r.with(self.value(&name, &name, &p.strength, 0.0));
+        }
         r = self.plain(r, &at("divider"), &c.divider);
         r = self.plain(r, &at("element"), &c.element);
         r = self.plain(r, &at("shear"), &c.shear);

@@ -97,8 +97,11 @@ impl Reader<'_> {
 
     fn material(&self, r: Recipe, i: usize) -> Recipe {
         let (at, material) = self.project.material(i);
+        let varied = material.varied().into_iter();
+        let r = varied
+            .fold(r, |r, (key, v)| r.with(self.value(&format!("material.{key}"), &format!("{at}.{key}"), v, 0.0)));
         let label = |key: &str| self.in_groom(&format!("{at}.{key}"));
-        material.values().into_iter().fold(r, |r, (key, x)| r.param(&format!("material.{key}"), x, label(key)))
+        material.even().into_iter().fold(r, |r, (key, x)| r.param(&format!("material.{key}"), x, label(key)))
     }
 
     /// Gravity and wind as they are from one frame to another.

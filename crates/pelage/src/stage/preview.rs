@@ -11,6 +11,7 @@ use crate::files::unfinished;
 use crate::format::{HairLayer, image::write_png};
 use crate::project::Project;
 use pelage_geom::{Offsets, SurfacePoint, Vec3};
+use pelage_groom::comb::Amount;
 use pelage_groom::instance::is_guard;
 use pelage_groom::look::clump::sides;
 use pelage_light::heat::{NO_VALUE, category_color, heat_color, range_of};
@@ -421,19 +422,22 @@ struct Gloss {
 
 fn gloss(run: &mut Runner<'_>, drawn: &Drawn, i: usize, frame: i32) -> Result<Gloss, Error> {
     let shade = run.project.shot.value.preview.shade.clone();
-    let guard = run.project.groom.value.layer[i].guard.clone().filter(|_| run.project.curves.is_none());
-    if guard.is_none() && !is_wet(run.project, i) && shade.wetness == 0.0 {
+    let guard = run.project.groom.value.layer[i].guard.is_some() && run.project.curves.is_none();
+    if !guard && !is_wet(run.project, i) && shade.wetness == 0.0 {
         return Ok(Gloss::default());
     }
     let all = interpolate::hairs(run, What::Frame(i, frame))?;
     let hairs = drawn.all[i].len();
     let wet: Vec<f32> = (0..hairs).map(|h| all.wet.get(h).map_or(0.0, |w| w[2]).max(shade.wetness as f32)).collect();
     let mut shine: Vec<f32> = wet.iter().map(|w| 1.0 + (WET_SHINE - 1.0) * w).collect();
-    if let Some(guard) = guard {
+    if guard {
         let seed = u64::from(layer_seed(&run.project.groom.value.layer[i].name));
         let roots = instance::roots(run, i)?;
-        let guards = shine.iter_mut().zip(&roots.id).filter(|(_, id)| is_guard(**id, guard.percent, seed));
-        guards.for_each(|(s, _)| *s *= shade.guard as f32);
+        let (value, factor) = instance::guard_share(run, i, &roots)?;
+        let share = Amount { value, factor: &factor };
+        let guards = shine.iter_mut().zip(&roots.id).enumerate();
+        let guards = guards.filter(|(h, (_, id))| is_guard(**id, share.of(*h), seed));
+        guards.for_each(|(_, (s, _))| *s *= shade.guard as f32);
     }
     let mut side = Vec::new();
     if let Some(&level) = acting_clumps(run.project, i).first()

@@ -1,5 +1,6 @@
 //! Simulate: hair in motion, one stretch of frames after another, each from the checkpoint at the end of the one before.
 
+mod material;
 mod moment;
 
 use super::body::{self, Colliders};
@@ -10,6 +11,7 @@ use crate::cache::LongStep;
 use crate::config::StrandModel;
 use crate::format::mcap;
 use crate::timeline::Timeline;
+use material::materials;
 use moment::{Source, check_at_rest, moment, rest_region, source, still};
 use pelage_geom::Vec3;
 use pelage_sim::{Hairs, Model, Rigid, Settings, SimError, Simulation, Span, SpanReport, Started};
@@ -164,7 +166,8 @@ fn start(run: &mut Runner<'_>, i: usize, timeline: &Timeline<'_>) -> Result<(Run
     let bytes = Simulation::memory(source.id.len(), points);
     let name = &run.project.groom.value.layer[i].name;
     run.say(&format!("{} hairs of {points} points in {name}: about {}", source.id.len(), size(bytes)));
-    let hairs = Hairs { offsets: &source.offsets, position: &source.position, id: &source.id };
+    let material = materials(run, i, &source)?;
+    let hairs = Hairs { offsets: &source.offsets, position: &source.position, id: &source.id, material: &material };
     let gravity = shot.simulate.gravity.downward(shot.shot.up).at(timeline.start() as f64);
     let (sim, started) = Simulation::new(&hairs, &settings, gravity).map_err(|e| failed(run, i, &e))?;
     let running = Running { layer: i, frame: timeline.start(), sim, source };
@@ -187,7 +190,7 @@ fn settings(run: &Runner<'_>, i: usize) -> Settings {
             StrandModel::Springs => Model::Springs,
             StrandModel::Paper => Model::Paper,
         },
-        material: run.project.material(i).1.si(),
+        material: run.project.material(i).1.si(|_| 1.0),
         segments: if run.project.curves.is_some() { s.segments } else { Some(run.project.segments()) },
         substeps: s.substeps,
         tolerance: s.tolerance.unwrap_or(Settings::default().tolerance),

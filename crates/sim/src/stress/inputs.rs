@@ -64,7 +64,7 @@ pub fn input_no_number(model: Model, m: &mut Measures) -> Done {
             let mut hairs = tuft();
             hairs[h][point][c] = bad;
             let (offsets, position) = (Offsets::from_counts(hairs.iter().map(Vec::len)), hairs.concat());
-            let input = Hairs { offsets: &offsets, position: &position, id: &[1, 2, 3, 4, 5] };
+            let input = Hairs { offsets: &offsets, position: &position, id: &[1, 2, 3, 4, 5], material: &[] };
             let refused = Simulation::new(&input, &settings(model), GRAVITY);
             taken +=
                 u32::from(!matches!(refused, Err(SimError::NotFinite { hair, point: p }) if (hair, p) == (h, point)));

@@ -1,0 +1,41 @@
+//! What each hair of a layer is made of, where that varies from hair to hair.
+
+use super::moment::Source;
+use crate::Error;
+use crate::config::{Target, check_material_value};
+use crate::stage::groom::{self, CONTROL_SEED};
+use crate::stage::run::Runner;
+use crate::stage::{clumps, layer_seed};
+use pelage_groom::look::member::rest_sites;
+use pelage_groom::look::vary::Drawn;
+use pelage_sim::Material;
+use std::collections::BTreeMap;
+
+/// What each hair of a layer is made of; empty if all are of the same.
+pub(super) fn materials(run: &mut Runner<'_>, i: usize, source: &Source) -> Result<Vec<Material>, Error> {
+    let (at, material) = run.project.material(i);
+    if run.project.curves.is_some() || !material.varied().iter().any(|(_, v)| v.varies()) {
+        return Ok(Vec::new());
+    }
+    let (skin, every) = (groom::skin(run)?, run.project.target(i) == Target::EveryHair);
+    let seed = if every { u64::from(layer_seed(&run.project.groom.value.layer[i].name)) } else { CONTROL_SEED };
+    let (view, root) = (groom::view(&skin), &source.root);
+    let uv: Vec<[f32; 2]> = root.iter().map(|p| view.uv(p)).collect();
+    let (position, _) = rest_sites(&view, root, skin.origin());
+    let hairs = Drawn { id: &source.id, uv: &uv, position: &position, seed };
+    let mut factor: BTreeMap<&str, Vec<f32>> = BTreeMap::new();
+    for (key, v) in material.varied() {
+        let column = clumps::column(run, &hairs, &format!("material.{key}"), v, false)?;
+        let value = |f: &f32| v.at(0.0) * f64::from(*f);
+        for (id, x) in source.id.iter().zip(column.iter().map(value)) {
+            let groom = &run.project.groom;
+            check_material_value(groom, &format!("{at}.{key}"), x).map_err(|mut e| {
+                e.what = format!("{} (hair {id}, by its map and variation)", e.what);
+                e
+            })?;
+        }
+        factor.insert(key, column);
+    }
+    let of = |h: usize| material.si(|key| factor[key].get(h).map_or(1.0, |f| f64::from(*f)));
+    Ok((0..source.id.len()).map(of).collect())
+}
