@@ -124,7 +124,7 @@ fn a_braid_of_braids_is_within_its_cluster_and_edits_of_it_are_told() {
                  [[0.0,9.0,0.0],[0.0,13.0,0.0],[1.0,17.0,0.0]]";
     assert_eq!(why.iter().collect::<Vec<_>>(), [moved]);
     assert!(
-        run.contains("groom/comb") && run.contains("interpolate/hair/1") && !run.contains("groom/place"),
+        run.contains("groom/comb") && run.contains("interpolate/hair/1") && !run.contains("instance/roots/hair"),
         "{run:?}"
     );
     shot.report(&[]);
@@ -133,6 +133,15 @@ fn a_braid_of_braids_is_within_its_cluster_and_edits_of_it_are_told() {
     let mean = leaning.values().map(|l| l[l.len() - 1][0]).sum::<f64>() / leaning.len() as f64;
     assert!((mean - 0.85).abs() < 0.35, "{mean}");
     is_as_from_nothing(&shot);
+}
+
+#[test]
+fn a_layer_without_hairs_is_written_in_every_format() {
+    let shot = groomed(&BRAID.replace("density = { value = 3.0 }", "density = { value = 0.0 }"));
+    shot.edit(SHOT, "formats = [\"usd\", \"mcap\"]", "formats = [\"usd\", \"mcap\", \"ply\"]");
+    shot.report(&[]);
+    assert!(positions(&shot, Some(0)).is_empty());
+    assert!(shot.path().join("out/ball/hair.usdc").is_file() && shot.path().join("out/ball/hair.0001.ply").is_file());
 }
 
 #[test]

@@ -454,6 +454,8 @@ fn clusters_chains_and_hairs_by_hand() {
         ("[[comb]]\nkind = \"bend\"\nangle = { value = 1.0, map = \"none.png\" }\n".to_owned(), "angle.map|none.png"),
         (keyed("[{ frame = 1, value = 1.0 }, { frame = 2, valeu = 0.0 }]"), "comb[1].angle|unknown field `valeu`"),
         (keyed("[{ frame = 1, value = 1.0 }, { frame = 2 }]"), "comb[1].angle|missing field `value`"),
+        ("[[comb]]\nkind = \"smooth\"\ncontrol_points = 3\n".to_owned(), "comb[1].control_points|out of range|help:"),
+        ("[[comb]]\nkind = \"smooth\"\ncontrol_points = 300\n".to_owned(), "comb[1].control_points|out of range|help:"),
         (keyed("[{ frame = 1, value = 1.0 }, 3.0]"), "comb[1].angle|no key frame"),
         (keyed("[{ frame = [1], value = 1.0 }]"), "comb[1].angle|a frame is a number"),
         (keyed("[{ frame = nan, value = 1.0 }]"), "comb[1].angle|finite numbers"),

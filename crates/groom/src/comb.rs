@@ -17,6 +17,7 @@ use crate::control::{ControlHairs, Skin, to_local, to_world, vec3};
 use crate::field::lengths::{Shear, Sphere, between_keys};
 use crate::flow::trace::{Lines, Start};
 use crate::flow::trim::{cut, length_to};
+use crate::spline::BSpline;
 use pelage_geom::curve::{closest_on_polyline, length as polyline_length};
 use pelage_geom::{Bvh, Frame, NONE, TiledMap, Vec3};
 use rayon::prelude::*;
@@ -130,6 +131,16 @@ pub enum CombKind<'a> {
         amount: Amount<'a>,
         /// Map multiplied onto the amount.
         map: Option<&'a TiledMap>,
+    },
+    /// Toward the cubic B-spline nearest to the hair's own shape, smoothed by Hermite pieces ("sparse guide hairs" in the same
+    /// course notes, §2.2): kinks go, the fewer the control points the more. A hair that determines no spline is left.
+    Smooth {
+        /// Control points of the spline, 4 to those of the hair.
+        control: usize,
+        /// How far toward it, 0 to 1.
+        bend: Amount<'a>,
+        /// Where along the hair, 0 to 1.
+        curvature: Amount<'a>,
     },
     /// Cuts hairs at a plane each ("sparse guide hairs" in the same course notes, §2.1); it never lengthens one. A weight of w
     /// takes off w of what the cut would.
@@ -283,12 +294,13 @@ fn starts(frames: &[Frame], hairs: &ControlHairs) -> Vec<Start> {
     frames.par_iter().enumerate().map(start).collect()
 }
 
-/// Turns segments toward those of a line of as many points, scene space; a line without length leaves a hair as it is.
-fn follow(line: &[Vec3], a: f64, curvature: f64, frame: &Frame, local: &mut [[f32; 3]]) -> CombCounts {
+/// Turns segments toward those of a line of as many points, which `along` brings into the root frame; a line without length
+/// leaves a hair as it is.
+fn follow(line: &[Vec3], along: impl Fn(Vec3) -> Vec3, a: f64, curvature: f64, local: &mut [[f32; 3]]) -> CombCounts {
     if a == 0.0 || line.windows(2).all(|w| w[0] == w[1]) {
         return CombCounts::default();
     }
-    let mut ahead = line.windows(2).map(|w| to_local(frame, w[1] - w[0]).try_normalize(0.0));
+    let mut ahead = line.windows(2).map(|w| along(w[1] - w[0]).try_normalize(0.0));
     rebuild(local, |d, s| {
         let target = ahead.next().flatten().unwrap_or(d);
         slerp(d, target, (a * (1.0 - curvature + curvature * s)).clamp(0.0, 1.0))
@@ -360,10 +372,18 @@ fn apply(kind: &CombKind, given: &Given, weight: f64, hair: Hair<'_>) -> CombCou
     match kind {
         CombKind::Follow { bend, curvature, .. } => match given {
             Given::Lines(lines) => {
-                follow(lines.line(index), weight * bend.of(index), curvature.of(index), frame, local)
+                let along = |v| to_local(frame, v);
+                follow(lines.line(index), along, weight * bend.of(index), curvature.of(index), local)
             }
             _ => CombCounts::default(),
         },
+        CombKind::Smooth { control, bend, curvature } => {
+            let points: Vec<Vec3> = local.iter().map(|p| vec3(*p)).collect();
+            match BSpline::through(&points, *control) {
+                Ok(line) => follow(&line, |v| v, weight * bend.of(index), curvature.of(index), local),
+                Err(_) => CombCounts::default(),
+            }
+        }
         // No handle, or a plane without a front.
         CombKind::Chain { .. } | CombKind::Mirror { .. } => CombCounts::default(),
         CombKind::DirectionCurve { points, radius, falloff, bend, curvature } => {

@@ -1,6 +1,8 @@
 use super::*;
 use crate::place::{PlaceSettings, Placement, place};
+use crate::spline::BSpline;
 use crate::test_skin::TestSkin;
+use pelage_geom::rng::uniform;
 use pelage_geom::{Map, Wrap};
 
 pub(super) fn groomed() -> (TestSkin, ControlHairs) {
@@ -329,4 +331,54 @@ fn hair_is_cut_to_lengths_between_keys() {
         let asked = between_keys(centre, &key, at(h)).min(before.length(h));
         assert!((hairs.length(h) - asked).abs() < 1e-5);
     }
+}
+
+#[test]
+fn smoothing_takes_kinks_out_and_leaves_splines() {
+    let (s, mut hairs) = groomed();
+    let n = hairs.points;
+    let smooth = |weight: f64, control: usize| CombOp {
+        weight: weight.into(),
+        ..op(CombKind::Smooth { control, bend: 1.0.into(), curvature: 0.0.into() })
+    };
+    // Points of a spline stay on it, those of other hairs zigzag.
+    for h in 0..hairs.len() {
+        let random = |k: usize, c| uniform(5, (h * n + k) as u64, 1, c) - 0.5;
+        let spline = BSpline { control: (0..4).map(|k| Vec3::new(k as f64, random(k, 0), random(k, 1))).collect() };
+        let first = spline.at(0.0);
+        for k in 0..n {
+            let p = (spline.at(k as f64 / (n - 1) as f64) - first) * 3.0
+                + if h % 2 == 1 { Vec3::z() * 0.2 * (k % 2) as f64 } else { Vec3::zeros() };
+            hairs.local[h * n + k] = [p.x as f32, p.y as f32, p.z as f32];
+        }
+    }
+    let before = hairs.clone();
+    let kinks = |c: &ControlHairs, h: usize| -> f64 {
+        let d: Vec<Vec3> = c.hair(h).windows(2).map(|w| (vec3(w[1]) - vec3(w[0])).normalize()).collect();
+        d.windows(2).map(|w| w[0].cross(&w[1]).norm()).fold(0.0, f64::max)
+    };
+    let mut none = before.clone();
+    let counts = comb(&s.skin(), &[], &[smooth(0.0, 4)], &mut none);
+    assert_eq!((counts[0].combed, &none), (0, &before));
+    let counts = comb(&s.skin(), &[], &[smooth(1.0, 4)], &mut hairs);
+    assert_eq!(counts[0].combed, hairs.len());
+    let mut half = before.clone();
+    comb(&s.skin(), &[], &[smooth(0.5, 4)], &mut half);
+    for h in 0..hairs.len() {
+        assert!((hairs.length(h) - before.length(h)).abs() < 1e-5 * before.length(h));
+        let moved = hairs.hair(h).iter().zip(before.hair(h)).map(|(a, b)| (vec3(*a) - vec3(*b)).norm());
+        if h % 2 == 0 {
+            let most = moved.fold(0.0, f64::max);
+            assert!(most < 0.03 * before.length(h), "hair {h} on a spline moved by {most}");
+        } else {
+            let [was, middle, now] = [&before, &half, &hairs].map(|c| kinks(c, h));
+            assert!(now < 0.6 * was && middle < was && now < middle, "{was} {middle} {now}");
+        }
+    }
+    // A hair without length is left as it is.
+    let mut short = before.clone();
+    (0..n).for_each(|k| short.local[k] = [0.0; 3]);
+    let was = short.hair(0).to_vec();
+    comb(&s.skin(), &[], &[smooth(1.0, 4)], &mut short);
+    assert_eq!(short.hair(0), was);
 }

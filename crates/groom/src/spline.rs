@@ -6,6 +6,9 @@
 use nalgebra::{DMatrix, DVector};
 use pelage_geom::Vec3;
 
+/// Points a piece: enough for any number of control points up to the number of points.
+const PARTS: usize = 4;
+
 /// Unit tangents at the points of a polyline: the mean direction of the two segments that meet there; at the ends the
 /// direction of the only one. Zero where segments have no length or turn right back.
 pub fn tangents(points: &[Vec3]) -> Vec<Vec3> {
@@ -105,9 +108,17 @@ impl BSpline {
 
     /// The spline of `m` control points nearest to a polyline smoothed by Hermite pieces ([`smooth`]), with its ends.
     pub fn near(points: &[Vec3], m: usize) -> Result<Self, String> {
-        // Four points a piece are enough for any number of control points up to the number of points.
-        let curve = smooth(points, 4);
+        let curve = smooth(points, PARTS);
         BSpline::fit(&curve, &arc_parameters(&curve), m)
+    }
+
+    /// The points of a polyline moved onto the spline of `m` control points near it (see [`BSpline::near`]), each to where it
+    /// is among them by arc length.
+    pub fn through(points: &[Vec3], m: usize) -> Result<Vec<Vec3>, String> {
+        let curve = smooth(points, PARTS);
+        let parameters = arc_parameters(&curve);
+        let spline = BSpline::fit(&curve, &parameters, m)?;
+        Ok(parameters.iter().step_by(PARTS).map(|t| spline.at(*t)).collect())
     }
 
     /// Point at `t`, clamped to [0, 1]; the first control point, or zero, of less than four.

@@ -31,7 +31,7 @@ pub struct Comb {
     pub radius: Option<LookValue>,
     /// direction-curve, chain: share of the radius over which the influence fades, 0 (hard) to 1. Default: 1.
     pub falloff: Option<LookValue>,
-    /// direction-curve, direction-map, field, flow, cluster: how far hairs turn toward the direction, 0 to 1. Default: 1.
+    /// direction-curve, direction-map, field, flow, cluster, smooth: how far hairs turn toward the direction, 0 to 1. Default: 1.
     pub bend: Option<LookValue>,
     /// 0: the whole hair turns at its root; 1: the turn grows from root to tip. Default: 0.
     #[serde(default = "super::look::zero")]
@@ -50,6 +50,8 @@ pub struct Comb {
     pub amount: Option<LookValue>,
     /// length: factor on the control hair's length.
     pub value: Option<LookValue>,
+    /// smooth: control points of the B-spline that hairs turn toward, 4 to `control.points`: the fewer, the smoother. Default: 4.
+    pub control_points: Option<usize>,
     /// chain: the name of the hair that is moved.
     pub hair: Option<String>,
     /// chain: instead of a name, the hair that stands nearest to this point, scene units.
@@ -154,6 +156,8 @@ pub enum CombKind {
     Flow,
     /// Lets hairs follow the clusters that they are in.
     Cluster,
+    /// Takes kinks out: turns hairs toward smooth curves near them.
+    Smooth,
     /// Moves a hair and its neighbours joint by joint, or by their tips.
     Chain,
     /// Gives hair on one side of a plane the mirrored shape of that on the other.
@@ -189,7 +193,7 @@ impl Document<GroomFile> {
     /// Keys that belong to another kind are refused: nobody should tune a value that nothing reads.
     pub(super) fn check_comb(&self, key: &str, c: &Comb) -> Result<(), ConfigError> {
         use CombKind::{
-            Bend, Chain, Cluster, Cut, DirectionCurve, DirectionMap, Field, Flow, LayDown, Length, Mirror, Trim,
+            Bend, Chain, Cluster, Cut, DirectionCurve, DirectionMap, Field, Flow, LayDown, Length, Mirror, Smooth, Trim,
         };
         let needed = match c.kind {
             DirectionCurve => "points",
@@ -201,13 +205,13 @@ impl Document<GroomFile> {
             // A body that lets something through is a flow by itself.
             Flow if c.panels.is_none() => "element",
             Flow => "panels",
-            Chain | Cluster => "",
+            Chain | Cluster | Smooth => "",
             Mirror => "plane",
             Trim => "file",
             Cut if c.key.is_empty() => "shear",
             Cut => "key",
         };
-        let given: [(&str, bool, &[CombKind]); 26] = [
+        let given: [(&str, bool, &[CombKind]); 27] = [
             ("points", c.points.is_some(), &[DirectionCurve]),
             ("radius", c.radius.is_some(), &[DirectionCurve, Chain]),
             ("falloff", c.falloff.is_some(), &[DirectionCurve, Chain]),
@@ -217,7 +221,8 @@ impl Document<GroomFile> {
             ("reach", c.reach.is_some(), &[Chain]),
             ("file", c.file.is_some(), &[Trim]),
             ("plane", c.plane.is_some(), &[Mirror]),
-            ("bend", c.bend.is_some(), &[DirectionCurve, DirectionMap, Field, Flow, Cluster]),
+            ("control_points", c.control_points.is_some(), &[Smooth]),
+            ("bend", c.bend.is_some(), &[DirectionCurve, DirectionMap, Field, Flow, Cluster, Smooth]),
             ("parting", c.parting.is_some(), &[DirectionCurve, Field, Flow, Cluster, Cut]),
             ("side", c.side.is_some(), &[DirectionCurve, Field, Flow, Cluster, Cut]),
             ("map", c.map.is_some(), &[DirectionMap, Bend, LayDown, Length]),
@@ -242,6 +247,12 @@ impl Document<GroomFile> {
         self.check_guides(key, c)?;
         if c.kind == Cluster {
             self.needs_clusters(key)?;
+        }
+        let most = self.value.control.points;
+        if c.kind == Smooth && !(4..=most).contains(&c.control_points.unwrap_or(4)) {
+            let help =
+                format!("splines have 4 control points or more, and no more than control hairs have points ({most})");
+            return Err(self.error(&format!("{key}.control_points"), "is out of range", help));
         }
         if c.points.as_ref().is_some_and(|p| p.len() < 2 || !p.iter().flatten().all(|x| x.is_finite())) {
             return Err(self.error(&format!("{key}.points"), "must be two or more finite points", ""));

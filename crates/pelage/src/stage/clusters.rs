@@ -55,7 +55,8 @@ pub(super) fn growing(run: &mut Runner<'_>, i: usize, roots: &[SurfacePoint]) ->
     let drawn = |p: &[f64; 2]| growth.is_empty() || growth.iter().any(|line| scalp::inside(line, *p));
     let mut out: Vec<bool> = at.par_iter().map(drawn).collect();
     if within {
-        let of = owners(&*tree(run, None)?, &at, None);
+        // Steps of their making part clusters of the file, and add none beside them.
+        let of = owners(&of_file(run, &run.project.groom.value.cluster)?, &at, Some(0));
         out.iter_mut().zip(of).for_each(|(o, k)| *o &= k != NONE);
     }
     Ok(out)
@@ -67,11 +68,25 @@ pub(super) fn tree(run: &mut Runner<'_>, frame: Option<i32>) -> Result<Arc<Tree>
     if let Some((_, found)) = run.tree.iter().find(|(at, _)| *at == frame) {
         return Ok(found.clone());
     }
+    let (clusters, edits) = run.project.clusters(frame);
+    let mut tree = of_file(run, &clusters)?;
+    for (i, e) in edits.iter().enumerate() {
+        let wrong = |e: String| run.project.groom.error(&format!("cluster_edit[{i}]"), e, "");
+        apply(&mut tree, &clusters, e).map_err(wrong)?;
+    }
+    // The one at rest and that of one frame.
+    run.tree.retain(|(at, _)| at.is_none());
+    let tree = Arc::new(tree);
+    run.tree.push((frame, tree.clone()));
+    Ok(tree)
+}
+
+/// The clusters that a file names, before any step.
+fn of_file(run: &mut Runner<'_>, clusters: &[config::Cluster]) -> Result<Tree, Error> {
     let (skin, map) = (groom::skin(run)?, painted(run)?);
     let groom = &run.project.groom;
     let space = space(&groom.value.scalp, map.as_ref());
     let view = groom::view(&skin);
-    let (clusters, edits) = run.project.clusters(frame);
     let mut tree = Tree::default();
     for (i, c) in clusters.iter().enumerate() {
         let wrong = |e: String| groom.error(&format!("cluster[{i}]"), e, "see where it stands on the skin");
@@ -80,14 +95,6 @@ pub(super) fn tree(run: &mut Runner<'_>, frame: Option<i32>) -> Result<Arc<Tree>
         tree.cluster.push(cluster);
         tree.shape(i as u32).map_err(wrong)?;
     }
-    for (i, e) in edits.iter().enumerate() {
-        let wrong = |e: String| groom.error(&format!("cluster_edit[{i}]"), e, "");
-        apply(&mut tree, &clusters, e).map_err(wrong)?;
-    }
-    // The one at rest and that of one frame.
-    run.tree.retain(|(at, _)| at.is_none());
-    let tree = Arc::new(tree);
-    run.tree.push((frame, tree.clone()));
     Ok(tree)
 }
 

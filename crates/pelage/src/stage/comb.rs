@@ -173,6 +173,7 @@ fn operation<'a>(run: &Runner<'_>, c: &Comb, read: &'a Read, guides: Option<Guid
         Kind::Field | Kind::Flow | Kind::Cluster => {
             CombKind::Follow { guides: guides.expect("made for these kinds"), bend, curvature }
         }
+        Kind::Smooth => CombKind::Smooth { control: c.control_points.unwrap_or(4), bend, curvature },
         Kind::Cut if !c.key.is_empty() => CombKind::Keys {
             centre: c.scalp.map_or(Vec3::zeros(), |b| b.centre.into()),
             key: c.key.iter().map(|k| (Vec3::from(k.at), k.length)).collect(),

@@ -75,7 +75,14 @@ impl Reader<'_> {
         let growth = &groom.scalp.growth;
         if groom.layer[i].in_clusters {
             let name = format!("layer[{i}].in_clusters");
-            r = self.clusters(self.rest(r.param("in_clusters", true, self.in_groom(&name))), None);
+            r = self.scalp(self.rest(r.param("in_clusters", true, self.in_groom(&name))));
+            // Their lines and what they are parted into move no root.
+            for (k, c) in groom.cluster.iter().enumerate() {
+                let at = |key: &str| format!("cluster[{k}].{key}");
+                r = self.plain(r, &at("root"), &c.root);
+                r = self.plain(r, &at("radius"), &c.radius);
+                r = self.plain(r, &at("outline"), &c.outline);
+            }
         } else if !growth.is_empty() {
             r = self.scalp(r);
         }
@@ -123,6 +130,7 @@ impl Reader<'_> {
         add("parting", c.parting.as_ref().and_then(parting).map(|p| p.to_string()));
         add("side", c.side.map(|s| format!("{s:?}")));
         add("space", c.space.map(|s| format!("{s:?}")));
+        add("control_points", c.control_points.map(|n| n.to_string()));
         add("level", c.level.map(|x| x.to_string()));
         for (key, v) in c.varied() {
             r = r.with(self.value(&name(key), &name(key), v, 0.0));
