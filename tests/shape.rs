@@ -136,6 +136,31 @@ fn a_braid_of_braids_is_within_its_cluster_and_edits_of_it_are_told() {
 }
 
 #[test]
+fn a_braid_with_key_frames_is_in_each_the_braid_of_its_values() {
+    let [still, swung] = [
+        "[[0.0, 9.0, 0.0], [0.0, 13.0, 0.0], [0.0, 17.0, 0.0]]",
+        "[[2.0, 9.0, 0.0], [7.0, 10.0, 1.0], [12.0, 9.0, 3.0]]",
+    ];
+    let look = "[layer.cluster]\n[[layer.clump]]\nclusters = 2\npercent = 0.7\n";
+    let groom = |points: &str| BRAID.replace(still, points).replace("[layer.cluster]\n", look);
+    let shot = groomed(&groom(&format!("[{{ frame = 1, value = {still} }}, {{ frame = 3, value = {swung} }}]")));
+    shot.report(&[]);
+    let moving = [0, 2].map(|f| positions(&shot, Some(f)));
+    for (points, moving) in [still, swung].into_iter().zip(&moving) {
+        shot.write(GROOM, groom(points));
+        shot.report(&[]);
+        let alone = positions(&shot, Some(2));
+        assert!(alone.keys().eq(moving.keys()));
+        let off =
+            |(a, b): (&Vec<[f64; 3]>, &Vec<[f64; 3]>)| a.iter().zip(b).map(|(p, q)| apart(*p, *q)).fold(0.0, f64::max);
+        let most = alone.values().zip(moving.values()).map(off).fold(0.0, f64::max);
+        assert!(most < 1e-3, "{points}: off by {most}");
+    }
+    let tip = |at: &BTreeMap<_, Vec<[f64; 3]>>| at.values().map(|l| l[l.len() - 1][0]).sum::<f64>() / at.len() as f64;
+    assert!(tip(&moving[0]).abs() < 1.0 && tip(&moving[1]) > 9.0);
+}
+
+#[test]
 fn a_layer_without_hairs_is_written_in_every_format() {
     let shot = groomed(&BRAID.replace("density = { value = 3.0 }", "density = { value = 0.0 }"));
     shot.edit(SHOT, "formats = [\"usd\", \"mcap\"]", "formats = [\"usd\", \"mcap\", \"ply\"]");

@@ -209,6 +209,12 @@ pub(super) const FEATURES: &[Shown] = &[
         ["reach = [-1.2, 0.6, 0.0]", "reach = [0.0, 0.6, 0.0]", "reach = [1.2, 0.9, 0.0]"],
     ),
     shown(
+        "comb.control_points",
+        Field,
+        "kind = \"chain\"\nat = [0.0, 0.0, 0.0]\nturn = [{ joint = 0, turn = [0, 0, -40] }, { joint = 1, turn = [0, 0, 80] }, { joint = 2, turn = [0, 0, -80] }, { joint = 3, turn = [0, 0, 80] }]\n[[comb]]\nkind = \"smooth\"",
+        ["weight = 0.0", "control_points = 5", "control_points = 4"],
+    ),
+    shown(
         "comb.plane",
         Field,
         "kind = \"direction-curve\"\npoints = [[-10.0, 0.0, -4.0], [10.0, 0.0, 4.0]]\nbend = 0.7\n[[comb]]\nkind = \"mirror\"",

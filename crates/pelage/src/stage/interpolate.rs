@@ -111,6 +111,14 @@ pub fn undisplaced(run: &mut Runner<'_>, i: usize) -> Result<Vec<[f32; 3]>, Erro
     }
 }
 
+/// The same as control hairs are combed at a frame.
+pub fn undisplaced_at(run: &mut Runner<'_>, i: usize, frame: i32) -> Result<Vec<[f32; 3]>, Error> {
+    match run.project.target(i) {
+        Target::Off => Ok(blended(run, What::Frame(i, frame), i, &SkinAt::Rest)?.0),
+        _ => undisplaced(run, i),
+    }
+}
+
 /// Control hairs that hair of a step is blended from.
 fn controls(run: &mut Runner<'_>, what: What) -> Result<Rc<ControlHairs>, Error> {
     match what {

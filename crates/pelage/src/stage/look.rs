@@ -92,7 +92,8 @@ pub fn finish(
     let (skin, pose) = (groom::skin(run)?, groom::pose(run, at)?);
     out.position = refined(out.position, from, points);
     let collides = last && collides(run.project, i);
-    let came = if collides && !acting.is_empty() { Some(out.position.clone()) } else { None };
+    let kept = collides && !acting.is_empty() || acting.iter().any(|e| e.has_lines(run.project, i));
+    let came = if kept { Some(out.position.clone()) } else { None };
     if !acting.is_empty() {
         let look = prepared(run, what, &acting, points, &out.position)?;
         let roots = instance::roots(run, i)?;
@@ -102,7 +103,9 @@ pub fn finish(
         };
         let sites = clumps::sites(run, i)?;
         let frame = what.frame();
-        let mut job = Job { i, points, frame, look: &look, axes: &axes, roots: &roots, sites: &sites, out: &mut out };
+        let came = came.as_deref().unwrap_or_default();
+        let mut job =
+            Job { i, points, frame, look: &look, axes: &axes, roots: &roots, sites: &sites, came, out: &mut out };
         for effect in acting {
             job.act(run, effect)?;
         }
@@ -167,8 +170,9 @@ fn collide(
     Ok(())
 }
 
-/// What does not change over the shot, made once a run for each set of parts: at rest and for the frames. Where clusters
-/// move it is made for each frame. `now` are the hairs that come into the step.
+/// What does not change over the shot, made once a run for each set of parts: at rest and for the frames. Where key frames
+/// move lines that hair is brought to, or the hair that carries them, it is made for each frame, so that hair is where it
+/// would be in a groom of that frame's values. `now` are the hairs that come into the step.
 fn prepared(
     run: &mut Runner<'_>,
     what: What,
@@ -178,8 +182,9 @@ fn prepared(
 ) -> Result<Rc<LayerLook>, Error> {
     let i = what.layer().expect("hairs are of a layer");
     let shaping = matches!(what, What::Rest(_));
-    let in_moving_clusters = |e: &Effect| e.clusters(run.project, i) && run.project.clusters_move();
-    let moment = what.frame().filter(|_| acting.iter().any(in_moving_clusters));
+    let combed = run.project.combs_move();
+    let moves = |e: &Effect| e.has_lines(run.project, i) && (combed || run.project.clusters_move());
+    let moment = what.frame().filter(|_| acting.iter().any(moves));
     if let Some((_, found)) = run.looks.get(&(i, shaping)).filter(|(at, _)| *at == moment) {
         return Ok(found.clone());
     }
@@ -193,6 +198,9 @@ fn prepared(
             _ => now.to_vec(),
         };
         look.axes = rest_axes(&skin.mesh, &skin.topology, &skin.rest, &roots.root, points, &rest);
+    }
+    if let Some(frame) = moment {
+        rest = refined(interpolate::undisplaced_at(run, i, frame)?, run.project.base_points(i), points);
     }
     if acting.contains(&Effect::Cluster) {
         look.clusters = in_clusters(run, i, moment, points, &rest, &look.axes)?;
@@ -369,6 +377,8 @@ struct Job<'a, 'b> {
     axes: &'a [RootAxes],
     roots: &'a Roots,
     sites: &'a RestSites,
+    /// Hairs as they came into the step, which carry lines; empty if there are none.
+    came: &'a [[f32; 3]],
     out: &'b mut Displaced,
 }
 
@@ -393,7 +403,7 @@ impl<'a> Job<'a, '_> {
             Effect::Cluster => {
                 let c = layer.cluster.as_ref().expect("the layer has clusters");
                 let own = &self.look.clusters;
-                let line = drawn_lines(points, &self.out.position, &own.carrier, self.axes, &own.local);
+                let line = drawn_lines(points, self.came, &own.carrier, self.axes, &own.local);
                 let percent = self.param(run, effect, "percent", &c.percent);
                 gather(points, &own.hair, percent, &own.rooted, &line, &mut self.out.position);
             }
@@ -498,7 +508,7 @@ impl<'a> Job<'a, '_> {
         let dilation = c.dilation.as_ref().map(|d| dilation(run, self.i, k, d, &m, self.roots)).transpose()?;
         let drawn = self.look.drawn.get(&k);
         let line = match drawn {
-            Some(d) => drawn_lines(points, &self.out.position, &m.centre, self.axes, d),
+            Some(d) => drawn_lines(points, self.came, &m.centre, self.axes, d),
             None => centre_lines(points, &self.out.position, &m.centre),
         };
         let moving = vec![NONE; if drawn.is_some() { m.centre.len() } else { 0 }];

@@ -104,7 +104,7 @@ pub(super) mod version {
     pub const SIMULATE: u32 = 6;
     pub const INTERPOLATE: u32 = 2;
     pub const CLUMP: u32 = 1;
-    pub const LOOK: u32 = 3;
+    pub const LOOK: u32 = 4;
     pub const COLLISION: u32 = 3;
     pub const AREAS: u32 = 1;
     pub const SHADOW: u32 = 3;

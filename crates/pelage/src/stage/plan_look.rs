@@ -29,10 +29,18 @@ impl Effect {
     /// True if it displaces along axes across the hair, which the skin carries.
     pub fn has_axes(self, project: &Project, i: usize) -> bool {
         match self {
-            Effect::Clump(k) => project.groom.value.layer[i].clump[k].has_lines(),
-            Effect::Cluster => true,
+            Effect::Cluster | Effect::Clump(_) => self.has_lines(project, i),
             Effect::Curl | Effect::Wave(_) | Effect::Noise(_) => true,
             Effect::Wind => false,
+        }
+    }
+
+    /// True if it brings hair to lines that are no hairs.
+    pub fn has_lines(self, project: &Project, i: usize) -> bool {
+        match self {
+            Effect::Cluster => true,
+            Effect::Clump(k) => project.groom.value.layer[i].clump[k].has_lines(),
+            _ => false,
         }
     }
 
