@@ -133,10 +133,15 @@ fn materials_are_painted() {
     let (run, why) = shot.plan(&[]);
     assert!(run.contains("simulate/over/1") && !run.iter().any(|r| r.contains("under")), "{run:?}");
     assert_eq!(why.iter().collect::<Vec<_>>(), ["maps/stiff.png changed"]);
-    // What a map paints too low is refused, not simulated.
+    // Nothing is without stiffness: black is a hundredth.
     shot.write("maps/stiff.png", paint(0));
+    let said = stage(&shot.report(&[]), "simulate")["warnings"].to_string();
+    assert!(said.contains("layer[1].material.bend_factor: its map and variation say less than 0.01"), "{said}");
+    // Too much is refused.
+    shot.edit(GROOM, &before, &bend("{ value = 1e9, noise = 0.5 }"));
     let said = String::from_utf8(shot.pelage(&["run"]).stderr).expect("text");
-    assert!(said.contains("layer[1].material.bend_factor: 0 is out of range") && said.contains("its map"), "{said}");
+    assert!(said.contains("layer[1].material.bend_factor") && said.contains("by its map and variation"), "{said}");
+    shot.edit(GROOM, &bend("{ value = 1e9, noise = 0.5 }"), &before);
     // Variation alone, through control hairs too.
     shot.edit(GROOM, &before, &bend("{ value = 5.0, noise = 0.5 }"));
     shot.edit(SHOT, "segments = 8", "segments = 8\ntarget = \"control-hairs\"");

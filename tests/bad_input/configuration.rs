@@ -459,6 +459,23 @@ fn clusters_chains_and_hairs_by_hand() {
         (keyed("[{ frame = 1, value = 1.0 }, 3.0]"), "comb[1].angle|no key frame"),
         (keyed("[{ frame = [1], value = 1.0 }]"), "comb[1].angle|a frame is a number"),
         (keyed("[{ frame = nan, value = 1.0 }]"), "comb[1].angle|finite numbers"),
+        (
+            "[[comb]]\nkind = \"field\"\nprimitive = [{ orientation = \"radial\" }]\ndivider = [{ point = \
+             [{ frame = 1, value = [0, 0, 0] }, { frame = 3, value = [4, 0, 0] }], normal = [1, 0, 0] }]\n"
+                .to_owned(),
+            "comb[1].divider[0].point|can't have key frames|help:",
+        ),
+        (
+            "[[comb]]\nkind = \"cut\"\nshear = { at = { point = [0, 0, 0], normal = \
+             [{ frame = 1, value = [0, 1, 0] }, { frame = 3, value = [0, -1, 0] }] } }\n"
+                .to_owned(),
+            "comb[1].shear.at|direction|at frame 2, between key frames",
+        ),
+        ("[[comb]]\nkind = \"mirror\"\nplane = { point = [0, 0, 0], normal = [1e300, 0, 0] }\n".to_owned(), "comb[1].plane|direction"),
+        (
+            format!("{}{}", keyed("[{ frame = 3, value = 6000.0 }, { frame = 5, value = 0.0 }]"), keyed("[{ frame = 4, value = 1.0 }]")),
+            "comb[1].angle|6000 is out of range",
+        ),
         (keyed("[{ frame = 1, value = true }]"), "comb[1].angle|key frames hold numbers"),
         (keyed("[{ frame = 1, value = 1.0 }, { frame = 2, value = 1000.0 }]"), "comb[1].angle|1000 is out of range"),
         (keyed("[{ frame = 1, value = 1.0 }, { frame = 2, value = [1.0] }]"), "comb[1].angle|different lengths"),

@@ -5,8 +5,7 @@ mod find;
 use crate::Error;
 use crate::cache::FileHashes;
 use crate::config::{
-    BodyKind, Cluster, ClusterEdit, Comb, CombKind, Document, Emitter, Feature, GroomFile, Key, Keyed, Layer, Material,
-    SEGMENTS, ShotFile, Target,
+    BodyKind, CombKind, Document, Emitter, Feature, GroomFile, Key, Keyed, Layer, Material, SEGMENTS, ShotFile, Target,
 };
 use crate::quality::{self, Resolved};
 use find::{Finder, missing, named_maps};
@@ -129,6 +128,8 @@ pub struct Project {
     pub mask: Option<Vec<(u32, InputFile)>>,
     /// Share of each layer's hairs that this is of: 1 for the shot itself.
     pub share: Vec<f64>,
+    /// What the groom file says at each frame, where combing or clusters have key frames.
+    pub shapes: BTreeMap<i32, GroomFile>,
     /// Every map, by the path written in the groom file: UDIM number (0 without tiles) and file.
     pub maps: BTreeMap<PathBuf, Vec<(u32, InputFile)>>,
 }
@@ -152,6 +153,7 @@ impl Project {
                 return Err(shot.error(key, what, "name a folder; it is made if it is absent").into());
             }
         }
+        let mut shapes = BTreeMap::new();
         let groom = match &shot.value.groom.file {
             Some(file) => {
                 let path = shot.resolve(file);
@@ -160,6 +162,8 @@ impl Project {
                 }
                 let mut groom: Document<GroomFile> = Document::read_joined(&path)?;
                 groom.check()?;
+                let [first, last] = shot.value.shot.frames;
+                shapes = groom.frames(first..=last)?;
                 groom.value = groom.at(f64::from(shot.value.shot.frames[0]));
                 groom.value.settle();
                 check_motion(&shot, &groom)?;
@@ -224,6 +228,7 @@ impl Project {
             maps,
             mask,
             quality,
+            shapes,
         })
     }
 
@@ -306,21 +311,9 @@ impl Project {
         (format!("layer[{longest}].length"), length)
     }
 
-    /// The combing at a frame, or at rest, without key frames.
-    pub fn combs(&self, frame: Option<i32>) -> Vec<Comb> {
-        match frame.filter(|_| self.combs_move()) {
-            Some(frame) => self.groom.at(f64::from(frame)).comb,
-            None => self.groom.value.comb.clone(),
-        }
-    }
-
-    /// Clusters at a frame, or at rest, and the steps of their making, without key frames.
-    pub fn clusters(&self, frame: Option<i32>) -> (Vec<Cluster>, Vec<ClusterEdit>) {
-        let GroomFile { cluster, cluster_edit, .. } = match frame.filter(|_| self.clusters_move()) {
-            Some(frame) => self.groom.at(f64::from(frame)),
-            None => self.groom.value.clone(),
-        };
-        (cluster, cluster_edit)
+    /// What the groom file says of combing and clusters at a frame, or at rest.
+    pub fn shape(&self, frame: Option<i32>) -> &GroomFile {
+        frame.and_then(|f| self.shapes.get(&f)).unwrap_or(&self.groom.value)
     }
 
     /// True if control hairs change over the shot by themselves.
@@ -423,7 +416,12 @@ fn moves_hairs(groom: &Document<GroomFile>) -> Option<&str> {
 /// Key frames move hair that is not simulated.
 fn check_motion(shot: &Document<ShotFile>, groom: &Document<GroomFile>) -> Result<(), Error> {
     let simulated = |l: &&Layer| l.simulate.unwrap_or(shot.value.simulate.target) != Target::Off;
-    let shaped = |l: &&Layer| simulated(l) && l.cluster.as_ref().is_some_and(|c| c.simulate);
+    // What is handed to the simulation of every hair is its shape at rest.
+    let every = |l: &Layer| l.simulate.unwrap_or(shot.value.simulate.target) == Target::EveryHair;
+    let in_shape = |l: &Layer| {
+        l.cluster.as_ref().is_some_and(|c| c.simulate) || l.clump.iter().any(|c| c.clusters.is_some() && c.simulate)
+    };
+    let shaped = |l: &&Layer| every(l) && in_shape(l);
     let layers = || groom.value.layer.iter();
     let (combs, clusters) = (moves_hairs(groom), moving(groom, "cluster"));
     let found = combs.zip(layers().find(simulated)).or_else(|| clusters.zip(layers().find(shaped)));

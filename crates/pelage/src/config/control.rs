@@ -3,7 +3,7 @@
 use super::GroomFile;
 use super::document::{ConfigError, Document, exactly};
 use super::groom::{Feature, points, some_points};
-use super::look_value::{LookValue, varied};
+use super::look_value::{LookValue, painted, varied};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::path::PathBuf;
@@ -75,7 +75,8 @@ pub struct ControlHair {
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Placement {
-    /// Control hairs per square centimetre of skin.
+    /// Control hairs per square centimetre of skin; a map lets fewer stand.
+    #[schemars(schema_with = "painted")]
     pub per_cm2: Option<LookValue>,
     /// Counts along u and along v, on every chart.
     #[serde(default, deserialize_with = "grid")]
@@ -146,6 +147,7 @@ impl Document<GroomFile> {
             let key = "control.placement.per_cm2";
             self.check_value(key, &varied("", d, [0.0, 1e4]))?;
             self.still(key, d)?;
+            self.only_painted(key, d)?;
             if d.varies() && p.relax > 0 {
                 return Err(self.error(key, "varies, and `relax` evens it out", "take one of the two out"));
             }

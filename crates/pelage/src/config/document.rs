@@ -143,8 +143,14 @@ fn read_at<T: DeserializeOwned>(source: &Source, keys: &AllKeys, frame: f64) -> 
     let text = keys.text(frame);
     let mut tree = source.tree()?;
     keys::put(tree.get_mut(), &text);
-    T::deserialize(toml::Deserializer::from(tree))
-        .map_err(|e| source.error(e.span(), first_line(e.message()), suggestion(e.message()).unwrap_or_default()))
+    T::deserialize(toml::Deserializer::from(tree)).map_err(|e| {
+        let whole = e.message().contains("floating point") && e.message().contains("expected usize");
+        let help = match suggestion(e.message()) {
+            None if whole => "write a whole number, without key frames".to_owned(),
+            help => help.unwrap_or_default(),
+        };
+        source.error(e.span(), first_line(e.message()), help)
+    })
 }
 
 fn read_text(path: &Path) -> Result<String, ConfigError> {

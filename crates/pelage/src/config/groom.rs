@@ -6,10 +6,11 @@ use super::control::Control;
 use super::document::{ConfigError, Document, Fixed, exactly};
 use super::keys::ROOTED;
 use super::look::{Clump, Collision, Curl, Emitter, Noise, Operator, Wave, WindLook};
-use super::look_value::{LookValue, varied};
+use super::look_value::{LookValue, painted, varied};
 use super::simulate::{Material, Target, check_material};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// Most points of a hair: a hundred turns of a curl with forty points each.
@@ -218,6 +219,7 @@ impl ColorFeature {
 #[serde(deny_unknown_fields)]
 pub struct Guard {
     /// Share of the layer's hairs that are guard hairs, 0 to 1. More keeps those that were.
+    #[schemars(schema_with = "painted")]
     pub percent: LookValue,
     /// Factor on their length. Default: 1.5.
     #[serde(default = "longer")]
@@ -356,16 +358,36 @@ impl GroomFile {
 impl Document<GroomFile> {
     /// Checks values that types can't, at every key frame.
     pub fn check(&self) -> Result<(), ConfigError> {
-        self.check_now()?;
         let rooted = |key: &str| key.starts_with("cluster[") && ROOTED.contains(&key.rsplit('.').next().unwrap_or(key));
         if let Some(k) = self.keyed().find(|k| rooted(&k.key)) {
             let help = "its roots stay where they are: key `points`, `width` or `twist`";
             return Err(self.error(&k.key, "can't have key frames", help));
         }
-        let mut frames: Vec<f64> = self.keyed().flat_map(|k| k.frame.clone()).collect();
-        frames.sort_by(f64::total_cmp);
-        frames.dedup();
-        frames.into_iter().try_for_each(|frame| self.settled(frame).check_now())
+        if let Some(k) = self.keyed().find(|k| k.key.contains("].divider[")) {
+            let help = "which hair follows which is the same in all frames: key fields instead";
+            return Err(self.error(&k.key, "can't have key frames", help));
+        }
+        // A value is complained of where it is written rather than between.
+        let wrong_at = |frame: f64| self.settled(frame).check_now().err();
+        for k in self.keyed() {
+            let own = k.frame.iter().filter_map(|f| wrong_at(*f)).find(|e| e.what.starts_with(&k.key));
+            own.map_or(Ok(()), Err)?;
+        }
+        self.check_now()?;
+        self.keyed().flat_map(|k| &k.frame).find_map(|f| wrong_at(*f)).map_or(Ok(()), Err)
+    }
+
+    /// It at every one of some frames, checked: what lies between key frames may be unsound too. Nothing without key frames.
+    pub fn frames(&self, frames: impl Iterator<Item = i32>) -> Result<BTreeMap<i32, GroomFile>, ConfigError> {
+        let then = |frame: i32| {
+            let settled = self.settled(f64::from(frame));
+            settled.check_now().map_err(|e| {
+                let what = format!("{} (at frame {frame}, between key frames)", e.what);
+                ConfigError { what, ..e }
+            })?;
+            Ok((frame, settled.value))
+        };
+        frames.filter(|_| self.keyed().next().is_some()).map(then).collect()
     }
 
     fn check_now(&self) -> Result<(), ConfigError> {

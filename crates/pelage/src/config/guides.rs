@@ -264,11 +264,7 @@ impl Document<GroomFile> {
             return Err(self.error(&format!("{key}.panels.most"), "is out of range", format!("20 to {MOST_PANELS}")));
         }
         let through = format!("{key}.panels.through");
-        for (name, given) in [("noise", p.through.0.noise != 0.0), ("vary", !p.through.0.vary.is_empty())] {
-            if given {
-                return Err(self.error(&format!("{through}.{name}"), "is not read here", "take it out"));
-            }
-        }
+        self.only_painted(&through, &p.through)?;
         self.check_value(&through, &varied("", &p.through, [-1e6, 1e6]))
     }
 
@@ -286,7 +282,7 @@ impl Document<GroomFile> {
     }
 
     pub(super) fn check_plane(&self, key: &str, p: &Plane) -> Result<(), ConfigError> {
-        if p.normal == [0.0; 3] || !p.point.iter().chain(&p.normal).all(|x| x.is_finite()) {
+        if !is_direction(&p.normal) || !p.point.iter().all(|x| x.abs() <= 1e9) {
             let help = "for example { point = [0.0, 8.0, 0.0], normal = [0.0, 1.0, 0.0] }";
             return Err(self.error(key, "must be a finite point and a direction", help));
         }

@@ -14,6 +14,16 @@ impl<T> Document<T> {
         }
     }
 
+    /// Complains about noise and variation of what only a map varies.
+    pub(super) fn only_painted(&self, at: &str, v: &LookValue) -> Result<(), ConfigError> {
+        for (name, given) in [("noise", v.0.noise != 0.0), ("vary", !v.0.vary.is_empty())] {
+            if given {
+                return Err(self.error(&format!("{at}.{name}"), "is not read here", "take it out; a map is read"));
+            }
+        }
+        Ok(())
+    }
+
     /// Checks a value, its key frames and how it varies.
     pub(super) fn check_value(&self, at: &str, v: &Varied<'_>) -> Result<(), ConfigError> {
         for k in &v.value.0.value.0 {

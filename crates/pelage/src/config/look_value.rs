@@ -127,6 +127,12 @@ impl JsonSchema for LookValue {
     }
 }
 
+/// Schema of a value that is the same in all frames: a number, or a table with a map and variation.
+pub(super) fn painted(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+    let (number, table) = (generator.subschema_for::<f64>(), generator.subschema_for::<VariedValue>());
+    schemars::json_schema!({ "anyOf": [number, table] })
+}
+
 /// A parameter of the look that varies over the skin.
 pub struct Varied<'a> {
     /// Its key below the operator's.

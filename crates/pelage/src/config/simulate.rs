@@ -3,7 +3,7 @@
 use super::ShotFile;
 use super::document::{ConfigError, Document, Fixed, exactly};
 use super::keyed::{Amount, Key, Keyed, Vector};
-use super::look_value::{LookValue, varied};
+use super::look_value::{LookValue, painted, varied};
 use schemars::JsonSchema;
 use serde::de::Deserializer;
 use serde::{Deserialize, Serialize};
@@ -281,22 +281,29 @@ impl BodyKind {
 #[serde(deny_unknown_fields, default)]
 pub struct Material {
     /// Diameter of the simulated hair, micrometres; the render width is another matter. Default: 70.
+    #[schemars(schema_with = "painted")]
     pub diameter: LookValue,
     /// Young's modulus, gigapascals. Default: 3.9.
+    #[schemars(schema_with = "painted")]
     pub young_gpa: LookValue,
     /// Poisson's ratio. Default: 0.3.
     pub poisson: f64,
     /// Density, kg/m3. Default: 1300.
+    #[schemars(schema_with = "painted")]
     pub density: LookValue,
     /// Internal damping: relaxation time of bending and twisting, seconds. Default: 0.002.
     pub damping: f64,
     /// Factor on bending stiffness. Default: 1.
+    #[schemars(schema_with = "painted")]
     pub bend_factor: LookValue,
     /// Factor on twisting stiffness. Default: 1.
+    #[schemars(schema_with = "painted")]
     pub twist_factor: LookValue,
     /// Factor on stretching stiffness. Default: 1.
+    #[schemars(schema_with = "painted")]
     pub stretch_factor: LookValue,
     /// Factor on the drag of the air. Default: 1.
+    #[schemars(schema_with = "painted")]
     pub drag_factor: LookValue,
 }
 

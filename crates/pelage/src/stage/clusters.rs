@@ -56,7 +56,7 @@ pub(super) fn growing(run: &mut Runner<'_>, i: usize, roots: &[SurfacePoint]) ->
     let mut out: Vec<bool> = at.par_iter().map(drawn).collect();
     if within {
         // Steps of their making part clusters of the file, and add none beside them.
-        let of = owners(&of_file(run, &run.project.groom.value.cluster)?, &at, Some(0));
+        let of = owners(&of_file(run, &run.project.groom.value.cluster, None)?, &at, Some(0));
         out.iter_mut().zip(of).for_each(|(o, k)| *o &= k != NONE);
     }
     Ok(out)
@@ -68,11 +68,12 @@ pub(super) fn tree(run: &mut Runner<'_>, frame: Option<i32>) -> Result<Arc<Tree>
     if let Some((_, found)) = run.tree.iter().find(|(at, _)| *at == frame) {
         return Ok(found.clone());
     }
-    let (clusters, edits) = run.project.clusters(frame);
-    let mut tree = of_file(run, &clusters)?;
-    for (i, e) in edits.iter().enumerate() {
-        let wrong = |e: String| run.project.groom.error(&format!("cluster_edit[{i}]"), e, "");
-        apply(&mut tree, &clusters, e).map_err(wrong)?;
+    let shape = run.project.shape(frame);
+    let mut tree = of_file(run, &shape.cluster, frame)?;
+    let when = frame.map_or(String::new(), |f| format!(" (at frame {f})"));
+    for (i, e) in shape.cluster_edit.iter().enumerate() {
+        let wrong = |e: String| run.project.groom.error(&format!("cluster_edit[{i}]"), e + &when, "");
+        apply(&mut tree, &shape.cluster, e).map_err(wrong)?;
     }
     // The one at rest and that of one frame.
     run.tree.retain(|(at, _)| at.is_none());
@@ -82,14 +83,15 @@ pub(super) fn tree(run: &mut Runner<'_>, frame: Option<i32>) -> Result<Arc<Tree>
 }
 
 /// The clusters that a file names, before any step.
-fn of_file(run: &mut Runner<'_>, clusters: &[config::Cluster]) -> Result<Tree, Error> {
+fn of_file(run: &mut Runner<'_>, clusters: &[config::Cluster], frame: Option<i32>) -> Result<Tree, Error> {
+    let when = frame.map_or(String::new(), |f| format!(" (at frame {f})"));
     let (skin, map) = (groom::skin(run)?, painted(run)?);
     let groom = &run.project.groom;
     let space = space(&groom.value.scalp, map.as_ref());
     let view = groom::view(&skin);
     let mut tree = Tree::default();
     for (i, c) in clusters.iter().enumerate() {
-        let wrong = |e: String| groom.error(&format!("cluster[{i}]"), e, "see where it stands on the skin");
+        let wrong = |e: String| groom.error(&format!("cluster[{i}]"), e + &when, "see where it stands on the skin");
         let onto = |p: Vec3| skin.bvh().closest(p, f64::INFINITY).map(|c| c.point).unwrap_or_default();
         let cluster = cluster(c, &view, &space, &onto).map_err(wrong)?;
         tree.cluster.push(cluster);

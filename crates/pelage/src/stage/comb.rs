@@ -61,7 +61,7 @@ fn comb_hairs(run: &mut Runner<'_>, what: What) -> Result<ControlHairs, Error> {
     };
     let skin = skin(run)?;
     let project = run.project;
-    let combs = project.combs(what.comb_frame());
+    let combs = &project.shape(what.comb_frame()).comb;
     let lines = partings(run);
     let id: Vec<u64> = (0..hairs.len() as u64).collect();
     let uv: Vec<[f32; 2]> = hairs.root.iter().map(|p| view(&skin).uv(p)).collect();
@@ -72,7 +72,7 @@ fn comb_hairs(run: &mut Runner<'_>, what: What) -> Result<ControlHairs, Error> {
     let millimetre = 1e-3 / project.shot.value.shot.meters_per_unit;
     let clearance = control.clearance * millimetre;
     let guard = Guard { surface: skin.bvh(), clearance };
-    let (guides, points) = (guides::guides(run, what.comb_frame(), &combs, &hairs, &drawn)?, hairs.points);
+    let (guides, points) = (guides::guides(run, what.comb_frame(), combs, &hairs, &drawn)?, hairs.points);
     let trace: Vec<_> =
         guides.iter().map(|g| g.as_ref().map(|g| |starts: &[Start]| g.lines(points, &guard, starts))).collect();
     let ops: Vec<CombOp<'_>> = combs

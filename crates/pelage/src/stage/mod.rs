@@ -16,6 +16,7 @@ mod plan_light;
 mod plan_look;
 mod plan_picture;
 mod plan_simulate;
+mod reasons;
 mod run;
 mod skin;
 

@@ -46,7 +46,7 @@ impl Reader<'_> {
         r = r.param("points", groom.control.points, self.in_groom("control.points"));
         let (key, length) = self.project.control_length();
         r = r.with(self.feature("length", &key, &length));
-        for (i, c) in self.project.combs(frame).iter().enumerate() {
+        for (i, c) in self.project.shape(frame).comb.iter().enumerate() {
             r = self.comb_fields(r, i, c, frame);
         }
         let control = &groom.control;
@@ -95,9 +95,9 @@ impl Reader<'_> {
 
     /// What clusters read at a frame, or at rest.
     pub(super) fn clusters(&self, r: Recipe, frame: Option<i32>) -> Recipe {
-        let (clusters, edits) = self.project.clusters(frame);
-        let r = self.plain(self.scalp(r), "cluster", &clusters);
-        self.plain(r, "cluster_edit", &edits)
+        let shape = self.project.shape(frame);
+        let r = self.plain(self.scalp(r), "cluster", &shape.cluster);
+        self.plain(r, "cluster_edit", &shape.cluster_edit)
     }
 
     /// Numbers and names of a value, each with its key.

@@ -2,7 +2,7 @@
 
 use super::explain::Seconds;
 use super::plan_light::is_shadowed;
-use super::{Plan, Stage, Step, What, skin};
+use super::{Plan, Stage, Step, What, reasons, skin};
 use crate::Error;
 use crate::cache::{Entry, FileHashes, Recipe, Store};
 use crate::config::MapRef;
@@ -327,7 +327,7 @@ impl<'a> Runner<'a> {
         if !frames.is_empty() {
             out.push(format!("new: frame {}", frame_list(&frames.into_iter().collect::<Vec<_>>())));
         }
-        out
+        reasons::together(out)
     }
 
     /// Frames that a step makes.

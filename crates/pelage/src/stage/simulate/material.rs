@@ -11,6 +11,10 @@ use pelage_groom::look::vary::Drawn;
 use pelage_sim::Material;
 use std::collections::BTreeMap;
 
+/// Least factor of a map and variation: nothing is without mass or stiffness. At 0 a strand has no equation to solve; a hundredth
+/// is softer than anybody paints.
+const LEAST: f32 = 0.01;
+
 /// What each hair of a layer is made of; empty if all are of the same.
 pub(super) fn materials(run: &mut Runner<'_>, i: usize, source: &Source) -> Result<Vec<Material>, Error> {
     let (at, material) = run.project.material(i);
@@ -25,7 +29,15 @@ pub(super) fn materials(run: &mut Runner<'_>, i: usize, source: &Source) -> Resu
     let hairs = Drawn { id: &source.id, uv: &uv, position: &position, seed };
     let mut factor: BTreeMap<&str, Vec<f32>> = BTreeMap::new();
     for (key, v) in material.varied() {
-        let column = clumps::column(run, &hairs, &format!("material.{key}"), v, false)?;
+        let mut column = clumps::column(run, &hairs, &format!("material.{key}"), v, false)?;
+        if key != "drag_factor" {
+            let less = column.iter_mut().filter(|f| **f < LEAST).map(|f| *f = LEAST).count();
+            if less > 0 {
+                let what =
+                    format!("{at}.{key}: its map and variation say less than {LEAST} for {less} hairs, which get that");
+                run.warn_once(what);
+            }
+        }
         let value = |f: &f32| v.at(0.0) * f64::from(*f);
         for (id, x) in source.id.iter().zip(column.iter().map(value)) {
             let groom = &run.project.groom;
