@@ -369,6 +369,13 @@ fn key_frames_move_control_hairs() {
     let groom = still.collect::<String>().replace("[layer.", layer);
     shot.write(GROOM, format!("[control]\nplacement = {{ per_cm2 = 1.0 }}\n{groom}\nsimulate = true\n"));
     refused(&shot, &["cluster[0].twist", "key frames", "layer coat is simulated"]);
+    let clumped = String::from_utf8(shot.read(GROOM)).expect("text");
+    let clumped = clumped.replace("[layer.cluster]", "[[layer.clump]]\nclusters = 1");
+    shot.write(GROOM, &clumped);
+    refused(&shot, &["cluster[0].twist", "key frames", "layer coat is simulated"]);
+    // What acts on every frame follows.
+    shot.write(GROOM, clumped.replace("simulate = true", ""));
+    shot.plan(&[]);
 }
 
 /// Combing and clusters with numbers `<at frame 1|at frame 3>`.

@@ -367,14 +367,20 @@ impl Document<GroomFile> {
             let help = "which hair follows which is the same in all frames: key fields instead";
             return Err(self.error(&k.key, "can't have key frames", help));
         }
+        let mut frames: Vec<f64> = self.keyed().flat_map(|k| k.frame.iter().copied()).collect();
+        frames.sort_by(f64::total_cmp);
+        frames.dedup();
+        let mut wrong: Vec<(f64, ConfigError)> =
+            frames.into_iter().filter_map(|f| Some((f, self.settled(f).check_now().err()?))).collect();
         // A value is complained of where it is written rather than between.
-        let wrong_at = |frame: f64| self.settled(frame).check_now().err();
-        for k in self.keyed() {
-            let own = k.frame.iter().filter_map(|f| wrong_at(*f)).find(|e| e.what.starts_with(&k.key));
-            own.map_or(Ok(()), Err)?;
+        let written = |(f, e): &(f64, ConfigError)| {
+            let at = e.what.split(": ").next().unwrap_or_default();
+            self.keyed().any(|k| k.frame.contains(f) && (k.key.starts_with(at) || at.starts_with(&k.key)))
+        };
+        match wrong.iter().position(written) {
+            Some(k) => Err(wrong.swap_remove(k).1),
+            None => self.check_now().and(wrong.into_iter().next().map_or(Ok(()), |(_, e)| Err(e))),
         }
-        self.check_now()?;
-        self.keyed().flat_map(|k| &k.frame).find_map(|f| wrong_at(*f)).map_or(Ok(()), Err)
     }
 
     /// It at every one of some frames, checked: what lies between key frames may be unsound too. Nothing without key frames.
