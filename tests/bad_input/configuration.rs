@@ -476,6 +476,7 @@ fn clusters_chains_and_hairs_by_hand() {
             format!("{}{}", keyed("[{ frame = 3, value = 6000.0 }, { frame = 5, value = 0.0 }]"), keyed("[{ frame = 4, value = 1.0 }]")),
             "comb[1].angle|6000 is out of range",
         ),
+        (format!("{cluster}{used}level = 1\n"), "comb[1].level|no clusters of level 1|help:"),
         (keyed("[{ frame = 1, value = true }]"), "comb[1].angle|key frames hold numbers"),
         (keyed("[{ frame = 1, value = 1.0 }, { frame = 2, value = 1000.0 }]"), "comb[1].angle|1000 is out of range"),
         (keyed("[{ frame = 1, value = 1.0 }, { frame = 2, value = [1.0] }]"), "comb[1].angle|different lengths"),

@@ -93,7 +93,7 @@ fn find(run: &mut Runner<'_>, i: usize, k: usize, what: What) -> Result<Members,
     sites.side = &side;
     let before = if joins_clumps(&c, k) { Some(clumps(run, i, k - 1)?) } else { None };
     let found = if let Some(level) = c.clusters {
-        in_clusters(run, level, &roots, &open)?
+        in_clusters(run, &format!("layer[{i}].clump[{k}].clusters"), level, &roots, &open)?
     } else if c.regions.is_some() {
         in_regions(run, &c, &roots, &sites, sizes.value, &open)?
     } else {
@@ -220,8 +220,9 @@ fn part(side: &mut Vec<[u64; 2]>, dividers: &[Region], first: usize, position: &
 }
 
 /// Clusters of a level as clumps; centres are the hairs nearest to their middles.
-fn in_clusters(run: &mut Runner<'_>, level: usize, roots: &Roots, open: &[bool]) -> Result<Members, Error> {
+fn in_clusters(run: &mut Runner<'_>, key: &str, level: usize, roots: &Roots, open: &[bool]) -> Result<Members, Error> {
     let (tree, uv) = (clusters::tree(run, None)?, clusters::coordinates(run, &roots.root)?);
+    clusters::check_level(run, &tree, key, Some(level))?;
     let mut of = clusters::owners(&tree, &uv, Some(level));
     of.iter_mut().zip(open).filter(|(_, open)| !**open).for_each(|(k, _)| *k = NONE);
     let middle = middles(&tree, &of, &uv);

@@ -234,6 +234,18 @@ fn apply(tree: &mut Tree, named: &[config::Cluster], e: &ClusterEdit) -> Result<
     Ok(())
 }
 
+/// Complains about a level, at a key of the groom, that no cluster is of.
+pub(super) fn check_level(run: &Runner<'_>, tree: &Tree, key: &str, level: Option<usize>) -> Result<(), Error> {
+    let last = tree.levels().into_iter().max().unwrap_or(0);
+    match level.filter(|l| *l > last) {
+        None => Ok(()),
+        Some(level) => {
+            let help = format!("levels go from 0, the clusters of the file, to {last}, what was split last");
+            Err(run.project.groom.error(key, format!("there are no clusters of level {level}"), help).into())
+        }
+    }
+}
+
 /// \[N\] the cluster of a level that each root is in (its last if it is in none of that level, or if no level is given), or
 /// [`NONE`].
 pub(super) fn owners(tree: &Tree, uv: &[[f64; 2]], level: Option<usize>) -> Vec<u32> {

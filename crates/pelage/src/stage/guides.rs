@@ -70,6 +70,7 @@ pub(super) fn guides(
         CombKind::Flow => Ok(Some(Guides::Flow(flow_of(run, i, c)?))),
         CombKind::Cluster => {
             let (tree, uv) = (clusters::tree(run, frame)?, clusters::coordinates(run, &hairs.root)?);
+            clusters::check_level(run, &tree, &format!("comb[{i}].level"), c.level)?;
             let of = clusters::owners(&tree, &uv, Some(c.level.unwrap_or(0)));
             Ok(Some(Guides::Clusters(InClusters { tree, of, uv })))
         }

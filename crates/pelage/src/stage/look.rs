@@ -272,6 +272,7 @@ fn in_clusters(
     let uv = clusters::coordinates(run, &roots.root)?;
     let top = clusters::owners(&tree, &uv, Some(0));
     let middle = cluster::middles(&tree, &top, &uv);
+    clusters::check_level(run, &tree, &format!("layer[{i}].cluster.level"), layer.level)?;
     let of = clusters::owners(&tree, &uv, layer.level);
     let origin = Vec3::from(skin.origin());
     let at: Vec<Vec3> = roots.root.iter().map(|p| skin.mesh.point(p)).collect();
