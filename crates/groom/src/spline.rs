@@ -108,16 +108,20 @@ impl BSpline {
 
     /// The spline of `m` control points nearest to a polyline smoothed by Hermite pieces ([`smooth`]), with its ends.
     pub fn near(points: &[Vec3], m: usize) -> Result<Self, String> {
+        BSpline::fit_smoothed(points, m).map(|(spline, _)| spline)
+    }
+
+    /// The same, and the parameters of the smoothed points.
+    fn fit_smoothed(points: &[Vec3], m: usize) -> Result<(Self, Vec<f64>), String> {
         let curve = smooth(points, PARTS);
-        BSpline::fit(&curve, &arc_parameters(&curve), m)
+        let parameters = arc_parameters(&curve);
+        Ok((BSpline::fit(&curve, &parameters, m)?, parameters))
     }
 
     /// The points of a polyline moved onto the spline of `m` control points near it (see [`BSpline::near`]), each to where it
     /// is among them by arc length.
     pub fn through(points: &[Vec3], m: usize) -> Result<Vec<Vec3>, String> {
-        let curve = smooth(points, PARTS);
-        let parameters = arc_parameters(&curve);
-        let spline = BSpline::fit(&curve, &parameters, m)?;
+        let (spline, parameters) = BSpline::fit_smoothed(points, m)?;
         Ok(parameters.iter().step_by(PARTS).map(|t| spline.at(*t)).collect())
     }
 

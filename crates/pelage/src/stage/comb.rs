@@ -2,7 +2,7 @@
 
 use super::What;
 use super::clumps::column;
-use super::groom::{CONTROL_SEED, partings, place_hairs, skin, view};
+use super::groom::{CONTROL_SEED, partings, place_hairs, places, skin, view};
 use super::guides;
 use super::run::{Counts, Runner};
 use super::skin::Texel;
@@ -15,7 +15,6 @@ use pelage_groom::comb::{Amount, CombKind, CombOp, DirectionSpace, Guides, Handl
 use pelage_groom::control::ControlHairs;
 use pelage_groom::field::lengths::Shear;
 use pelage_groom::flow::trace::{Guard, Start};
-use pelage_groom::look::member::rest_sites;
 use pelage_groom::look::vary::Drawn;
 use pelage_groom::push_up::{PushUp, push_up};
 use std::collections::BTreeMap;
@@ -64,8 +63,7 @@ fn comb_hairs(run: &mut Runner<'_>, what: What) -> Result<ControlHairs, Error> {
     let combs = &project.shape(what.comb_frame()).comb;
     let lines = partings(run);
     let id: Vec<u64> = (0..hairs.len() as u64).collect();
-    let uv: Vec<[f32; 2]> = hairs.root.iter().map(|p| view(&skin).uv(p)).collect();
-    let (position, _) = rest_sites(&view(&skin), &hairs.root, skin.origin());
+    let (uv, position) = places(&skin, &hairs.root);
     let drawn = Drawn { id: &id, uv: &uv, position: &position, seed: CONTROL_SEED };
     let read = combs.iter().enumerate().map(|(i, c)| Read::new(run, i, c, &drawn)).collect::<Result<Vec<_>, _>>()?;
     let control = &project.groom.value.control;

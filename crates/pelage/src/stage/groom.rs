@@ -3,7 +3,7 @@
 use super::run::{Counts, Runner};
 use super::skin::Texel;
 use super::tables::{decode, encode, table, vector_columns, vectors_of};
-use super::{Skin, SkinPose, What, clumps};
+use super::{Skin, SkinPose, What};
 use crate::Error;
 use crate::config::LookValue;
 use crate::curves;
@@ -13,7 +13,6 @@ use pelage_geom::{Offsets, SurfacePoint, Vec3};
 use pelage_groom::candidates::{candidates, rank};
 use pelage_groom::control::{self, ControlHairs, PartingPiece, Sites};
 use pelage_groom::look::member::rest_sites;
-use pelage_groom::look::vary::Drawn;
 use pelage_groom::place::{Line, PlaceSettings, Placement, Single, place};
 use std::rc::Rc;
 
@@ -197,26 +196,17 @@ pub(super) fn place_hairs(run: &mut Runner<'_>) -> Result<(ControlHairs, Sites, 
     Ok((hairs, sites, counts))
 }
 
-/// The candidates, in their order, whose rank is below what a density says of its largest there; a density that does not vary
-/// leaves them all.
+/// The candidates, in their order, whose rank is below what a density's map says there; one without a map leaves them all.
 fn thinned(
     run: &mut Runner<'_>,
     skin: &Skin,
     density: &LookValue,
     root: Vec<SurfacePoint>,
 ) -> Result<Vec<SurfacePoint>, Error> {
-    if !density.varies() {
-        return Ok(root);
-    }
-    let view = view(skin);
-    let id: Vec<u64> = (0..root.len() as u64).collect();
-    let uv: Vec<[f32; 2]> = root.iter().map(|p| view.uv(p)).collect();
-    let (position, _) = rest_sites(&view, &root, skin.origin());
-    let drawn = Drawn { id: &id, uv: &uv, position: &position, seed: CONTROL_SEED };
-    let share = clumps::column(run, &drawn, "control.placement.per_cm2", density, false)?;
-    let all = root.len() as f64;
-    let grows = |k: usize| rank(k as u64) < f64::from(share[k]) * all;
-    Ok(root.into_iter().enumerate().filter(|(k, _)| grows(*k)).map(|(_, p)| p).collect())
+    let Some(map) = density.map().map(|m| run.map(&m, Texel::Value)).transpose()? else { return Ok(root) };
+    let (view, all) = (view(skin), root.len() as f64);
+    let grows = |k: usize, p: &SurfacePoint| rank(k as u64) < f64::from(map.value(view.uv(p))) * all;
+    Ok(root.into_iter().enumerate().filter(|(k, p)| grows(*k, p)).map(|(_, p)| p).collect())
 }
 
 /// The skin at a moment. Layers and stages ask for the same one after another: the last is kept.
@@ -227,6 +217,12 @@ pub fn pose(run: &mut Runner<'_>, at: &SkinAt) -> Result<Rc<SkinPose>, Error> {
     let pose = Rc::new(skin(run)?.pose(at)?);
     run.pose = Some((at.clone(), pose.clone()));
     Ok(pose)
+}
+
+/// Texture coordinates of roots, and where they stand at rest: what their numbers are drawn by.
+pub(super) fn places(skin: &Skin, roots: &[SurfacePoint]) -> (Vec<[f32; 2]>, Vec<[f32; 3]>) {
+    let view = view(skin);
+    (roots.iter().map(|p| view.uv(p)).collect(), rest_sites(&view, roots, skin.origin()).0)
 }
 
 pub(super) fn view(skin: &Skin) -> control::Skin<'_> {

@@ -346,22 +346,32 @@ pub(super) fn feature(run: &mut Runner<'_>, what: What, i: usize, roots: &Roots)
         values.iter_mut().zip(&roots.id).for_each(|(value, id)| *value *= own(id));
     }
     if let Some(factor) = guard {
-        let (value, varies) = guard_share(run, i, roots)?;
-        scale_guards(&mut values, roots, Amount { value, factor: &varies }, factor, seed);
+        scale_guard_hairs(run, i, roots, factor, &mut values)?;
     }
     Ok(values)
 }
 
-/// The share of a layer's hairs that are guard hairs, and factors on it from hair to hair.
-pub(super) fn guard_share(run: &mut Runner<'_>, i: usize, roots: &Roots) -> Result<(f64, Vec<f32>), Error> {
+/// Multiplies what some of a layer's hairs have by a factor where they are guard hairs.
+pub(super) fn scale_guard_hairs(
+    run: &mut Runner<'_>,
+    i: usize,
+    roots: &Roots,
+    by: f32,
+    values: &mut [f32],
+) -> Result<(), Error> {
     let layer = &run.project.groom.value.layer[i];
-    let percent = &layer.guard.as_ref().expect("the layer has guard hairs").percent;
-    let position = match percent.0.vary.is_empty() {
-        true => Vec::new(),
-        false => clumps::sites(run, i)?.position.clone(),
+    let (percent, seed) = match &layer.guard {
+        Some(guard) => (&guard.percent, u64::from(layer_seed(&layer.name))),
+        None => return Ok(()),
     };
-    let hairs = Drawn { id: &roots.id, uv: &roots.uv, position: &position, seed: u64::from(layer_seed(&layer.name)) };
-    Ok((percent.at(0.0), clumps::column(run, &hairs, "guard.percent", percent, false)?))
+    let mut position = Vec::new();
+    if !percent.0.vary.is_empty() {
+        position = groom::places(&*groom::skin(run)?, &roots.root).1;
+    }
+    let hairs = Drawn { id: &roots.id, uv: &roots.uv, position: &position, seed };
+    let factor = clumps::column(run, &hairs, "guard.percent", percent, false)?;
+    scale_guards(values, roots, Amount { value: percent.at(0.0), factor: &factor }, by, seed);
+    Ok(())
 }
 
 /// Linear colour of every hair.

@@ -29,6 +29,8 @@ pub struct LayerHairs {
     /// Their weights.
     pub weight: Vec<[f32; 3]>,
     /// Lengths before they are cut, scene units.
+    whole: Vec<f32>,
+    /// Lengths among control hairs as they are combed at rest, scene units.
     pub length: Vec<f32>,
 }
 
@@ -38,7 +40,9 @@ fn layer(run: &mut Runner<'_>, i: usize) -> Result<Rc<LayerHairs>, Error> {
     }
     let roots = instance::roots(run, i)?;
     let (hair, weight) = instance::weights(run, i)?;
-    let length = instance::column(run, What::Length(i), i)?;
+    let whole = instance::column(run, What::Length(i), i)?;
+    let control = comb::combed(run)?;
+    let length = cut(run, &hair, &weight, &control, whole.clone());
     let points = run.project.base_points(i);
     let most = points.max(run.project.points(i));
     if u32::try_from(roots.id.len() * most).is_err() {
@@ -46,7 +50,7 @@ fn layer(run: &mut Runner<'_>, i: usize) -> Result<Rc<LayerHairs>, Error> {
         let help = "lower the density or the points, or make two layers of it";
         return Err(run.project.groom.error(&format!("layer[{i}].points"), what, help).into());
     }
-    let found = Rc::new(LayerHairs { points, roots, hair, weight, length });
+    let found = Rc::new(LayerHairs { points, roots, hair, weight, whole, length });
     run.layers.insert(i, found.clone());
     Ok(found)
 }
@@ -127,20 +131,32 @@ fn controls(run: &mut Runner<'_>, what: What) -> Result<Rc<ControlHairs>, Error>
     }
 }
 
-/// Lengths of a layer's hairs in a step, scene units: cut, and changed as control hairs change that are hairs themselves.
-fn lengths(run: &mut Runner<'_>, what: What, i: usize, layer: &LayerHairs) -> Result<Vec<f32>, Error> {
-    let (now, rest) = (controls(run, what)?, comb::combed(run)?);
-    let mut length = layer.length.clone();
-    if !Rc::ptr_eq(&now, &rest) && instance::is_by_hand(run, i) {
+/// Lengths among control hairs of which some were cut.
+fn cut(
+    run: &Runner<'_>,
+    hair: &[[u32; 3]],
+    weight: &[[f32; 3]],
+    control: &ControlHairs,
+    mut length: Vec<f32>,
+) -> Vec<f32> {
+    if run.project.groom.value.comb.iter().any(|c| matches!(c.kind, CombKind::Cut | CombKind::Trim)) {
+        cut_lengths(hair, weight, &control.cut, &mut length);
+    }
+    length
+}
+
+/// Lengths of a layer's hairs at a frame where control hairs move, scene units: cut, and changed as those are that are hairs
+/// themselves.
+fn moved_lengths(run: &mut Runner<'_>, i: usize, layer: &LayerHairs, now: &ControlHairs) -> Result<Vec<f32>, Error> {
+    let mut length = layer.whole.clone();
+    if instance::is_by_hand(run, i) {
+        let rest = comb::combed(run)?;
         for (length, [own, ..]) in length.iter_mut().zip(&layer.hair) {
-            let [now, rest] = [&now, &rest].map(|c| c.length(*own as usize));
+            let [now, rest] = [now, &rest].map(|c| c.length(*own as usize));
             *length *= if rest > 0.0 { (now / rest) as f32 } else { 1.0 };
         }
     }
-    if run.project.groom.value.comb.iter().any(|c| matches!(c.kind, CombKind::Cut | CombKind::Trim)) {
-        cut_lengths(&layer.hair, &layer.weight, &now.cut, &mut length);
-    }
-    Ok(length)
+    Ok(cut(run, &layer.hair, &layer.weight, now, length))
 }
 
 /// Hairs blended from control hairs, and how many had directions that cancelled.
@@ -149,7 +165,13 @@ fn blended(run: &mut Runner<'_>, what: What, i: usize, at: &SkinAt) -> Result<(V
     let layer = layer(run, i)?;
     let pose = groom::pose(run, at)?;
     let from_roots = run.project.groom.value.layer[i].root_frames;
-    let length = lengths(run, what, i, &layer)?;
+    let moved = match what {
+        What::Frame(_, f) if run.project.combs_move() => {
+            let now = comb::combed_at(run, f)?;
+            Some(moved_lengths(run, i, &layer, &now)?)
+        }
+        _ => None,
+    };
     let control = match (what, run.project.target(i)) {
         (What::Frame(_, f), Target::ControlHairs) => {
             let simulated = simulate::positions(run, i, f)?;
@@ -170,7 +192,7 @@ fn blended(run: &mut Runner<'_>, what: What, i: usize, at: &SkinAt) -> Result<(V
         root: if from_roots { &origin } else { &root },
         hair: &layer.hair,
         weight: &layer.weight,
-        length: &length,
+        length: moved.as_ref().unwrap_or(&layer.length),
     };
     let mut out = vec![[0.0f32; 3]; layer.roots.id.len() * layer.points];
     let found = interpolate(&blend, &control, &mut out);

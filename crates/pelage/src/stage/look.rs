@@ -42,9 +42,14 @@ pub struct LayerLook {
     root: BTreeMap<usize, Vec<f32>>,
     /// Axes of the roots at rest, in their root frames; empty if nothing needs them.
     axes: Vec<RootAxes>,
+}
+
+/// Lines that are no hairs, in the axes of the hairs that carry them.
+#[derive(Debug, Default)]
+pub struct CarriedLines {
     /// Places of hairs in clusters.
     clusters: InClusters,
-    /// Lines of clumps that are no hairs, in the axes of their carriers, by level.
+    /// Lines of clumps, by level.
     drawn: BTreeMap<usize, Vec<[f32; 3]>>,
 }
 
@@ -95,7 +100,7 @@ pub fn finish(
     let kept = collides && !acting.is_empty() || acting.iter().any(|e| e.has_lines(run.project, i));
     let came = if kept { Some(out.position.clone()) } else { None };
     if !acting.is_empty() {
-        let look = prepared(run, what, &acting, points, &out.position)?;
+        let (look, lines) = prepared(run, what, &acting, points, &out.position)?;
         let roots = instance::roots(run, i)?;
         let axes = match look.axes.is_empty() {
             true => Vec::new(),
@@ -104,8 +109,9 @@ pub fn finish(
         let sites = clumps::sites(run, i)?;
         let frame = what.frame();
         let came = came.as_deref().unwrap_or_default();
+        let (look, lines) = (&*look, &*lines);
         let mut job =
-            Job { i, points, frame, look: &look, axes: &axes, roots: &roots, sites: &sites, came, out: &mut out };
+            Job { i, points, frame, look, lines, axes: &axes, roots: &roots, sites: &sites, came, out: &mut out };
         for effect in acting {
             job.act(run, effect)?;
         }
@@ -170,8 +176,8 @@ fn collide(
     Ok(())
 }
 
-/// What does not change over the shot, made once a run for each set of parts: at rest and for the frames. Where key frames
-/// move lines that hair is brought to, or the hair that carries them, it is made for each frame, so that hair is where it
+/// What does not change over the shot, made once a run for each set of parts: at rest and for the frames. Lines that hair is
+/// brought to are made for each frame where key frames move them, or the hair that carries them, so that hair is where it
 /// would be in a groom of that frame's values. `now` are the hairs that come into the step.
 fn prepared(
     run: &mut Runner<'_>,
@@ -179,47 +185,78 @@ fn prepared(
     acting: &[Effect],
     points: usize,
     now: &[[f32; 3]],
-) -> Result<Rc<LayerLook>, Error> {
+) -> Result<(Rc<LayerLook>, Rc<CarriedLines>), Error> {
     let i = what.layer().expect("hairs are of a layer");
     let shaping = matches!(what, What::Rest(_));
     let combed = run.project.combs_move();
     let moves = |e: &Effect| e.has_lines(run.project, i) && (combed || run.project.clusters_move());
     let moment = what.frame().filter(|_| acting.iter().any(moves));
-    if let Some((_, found)) = run.looks.get(&(i, shaping)).filter(|(at, _)| *at == moment) {
-        return Ok(found.clone());
+    let at = (i, shaping);
+    let at_rest = |run: &mut Runner<'_>| match what {
+        What::Frame(..) => {
+            Ok::<_, Error>(refined(interpolate::undisplaced(run, i)?, run.project.base_points(i), points))
+        }
+        _ => Ok(now.to_vec()),
+    };
+    let mut rest = None;
+    let look = match run.looks.get(&at) {
+        Some(found) => found.clone(),
+        None => {
+            let (skin, roots) = (groom::skin(run)?, instance::roots(run, i)?);
+            let mut look = LayerLook::default();
+            if acting.iter().any(|e| e.has_axes(run.project, i)) {
+                let rest = rest.insert(at_rest(run)?);
+                look.axes = rest_axes(&skin.mesh, &skin.topology, &skin.rest, &roots.root, points, rest);
+            }
+            for effect in acting {
+                columns(run, i, *effect, &mut look)?;
+            }
+            note_coarse_curls(run, i, acting, points)?;
+            run.looks.entry(at).or_insert(Rc::new(look)).clone()
+        }
+    };
+    if !acting.iter().any(|e| e.has_lines(run.project, i)) {
+        return Ok((look, Rc::default()));
     }
-    let skin = groom::skin(run)?;
-    let (roots, sites) = (instance::roots(run, i)?, clumps::sites(run, i)?);
-    let mut look = LayerLook::default();
-    let mut rest = Vec::new();
-    if acting.iter().any(|e| e.has_axes(run.project, i)) {
-        rest = match what {
-            What::Frame(..) => refined(interpolate::undisplaced(run, i)?, run.project.base_points(i), points),
-            _ => now.to_vec(),
-        };
-        look.axes = rest_axes(&skin.mesh, &skin.topology, &skin.rest, &roots.root, points, &rest);
+    if let Some((_, found)) = run.lines.get(&at).filter(|(then, _)| *then == moment) {
+        return Ok((look, found.clone()));
     }
-    if let Some(frame) = moment {
-        rest = refined(interpolate::undisplaced_at(run, i, frame)?, run.project.base_points(i), points);
-    }
+    let rest = match (moment, rest) {
+        (Some(frame), _) => refined(interpolate::undisplaced_at(run, i, frame)?, run.project.base_points(i), points),
+        (None, Some(rest)) => rest,
+        (None, None) => at_rest(run)?,
+    };
+    let lines = Rc::new(carried_lines(run, i, moment, acting, points, &rest, &look.axes)?);
+    run.lines.insert(at, (moment, lines.clone()));
+    Ok((look, lines))
+}
+
+/// Lines at a frame, or at rest, in the axes of the hairs `rest` that carry them.
+fn carried_lines(
+    run: &mut Runner<'_>,
+    i: usize,
+    frame: Option<i32>,
+    acting: &[Effect],
+    points: usize,
+    rest: &[[f32; 3]],
+    axes: &[RootAxes],
+) -> Result<CarriedLines, Error> {
+    let mut out = CarriedLines::default();
     if acting.contains(&Effect::Cluster) {
-        look.clusters = in_clusters(run, i, moment, points, &rest, &look.axes)?;
+        out.clusters = in_clusters(run, i, frame, points, rest, axes)?;
     }
     for effect in acting {
-        columns(run, i, *effect, &roots, &sites, &mut look)?;
         if let Effect::Clump(k) = effect
-            && let Some(lines) = clump_lines(run, i, moment, *k, points)?
+            && let Some(lines) = clump_lines(run, i, frame, *k, points)?
         {
+            let (skin, roots) = (groom::skin(run)?, instance::roots(run, i)?);
             let members = clumps::clumps(run, i, *k)?;
-            let axes = carried(&skin.mesh, &skin.topology, &skin.rest, &roots.root, &look.axes);
+            let axes = carried(&skin.mesh, &skin.topology, &skin.rest, &roots.root, axes);
             let line = sampled(&lines, Vec3::from(skin.origin()), points);
-            look.drawn.insert(*k, bind_lines(points, &rest, &members.centre, &axes, &line));
+            out.drawn.insert(*k, bind_lines(points, rest, &members.centre, &axes, &line));
         }
     }
-    note_coarse_curls(run, i, acting, points)?;
-    let look = Rc::new(look);
-    run.looks.insert((i, shaping), (moment, look.clone()));
-    Ok(look)
+    Ok(out)
 }
 
 fn refined(position: Vec<[f32; 3]>, from: usize, to: usize) -> Vec<[f32; 3]> {
@@ -305,15 +342,9 @@ fn sampled(lines: &[Vec<Vec3>], origin: Vec3, points: usize) -> Vec<[f32; 3]> {
 }
 
 /// Columns of a part's parameters.
-fn columns(
-    run: &mut Runner<'_>,
-    i: usize,
-    effect: Effect,
-    roots: &Roots,
-    sites: &RestSites,
-    look: &mut LayerLook,
-) -> Result<(), Error> {
+fn columns(run: &mut Runner<'_>, i: usize, effect: Effect, look: &mut LayerLook) -> Result<(), Error> {
     let project = run.project;
+    let (roots, sites) = (instance::roots(run, i)?, clumps::sites(run, i)?);
     let layer = &project.groom.value.layer[i];
     let (key, seed) = (effect.key(), u64::from(layer_seed(&layer.name)));
     let own = Drawn { id: &roots.id, uv: &roots.uv, position: &sites.position, seed };
@@ -375,6 +406,7 @@ struct Job<'a, 'b> {
     /// `None` at rest.
     frame: Option<i32>,
     look: &'a LayerLook,
+    lines: &'a CarriedLines,
     axes: &'a [RootAxes],
     roots: &'a Roots,
     sites: &'a RestSites,
@@ -403,7 +435,7 @@ impl<'a> Job<'a, '_> {
         match effect {
             Effect::Cluster => {
                 let c = layer.cluster.as_ref().expect("the layer has clusters");
-                let own = &self.look.clusters;
+                let own = &self.lines.clusters;
                 let line = drawn_lines(points, self.came, &own.carrier, self.axes, &own.local);
                 let percent = self.param(run, effect, "percent", &c.percent);
                 gather(points, &own.hair, percent, &own.rooted, &line, &mut self.out.position);
@@ -507,7 +539,7 @@ impl<'a> Job<'a, '_> {
             (percent, rate) = (in_areas(area_percent), in_areas(area_rate));
         }
         let dilation = c.dilation.as_ref().map(|d| dilation(run, self.i, k, d, &m, self.roots)).transpose()?;
-        let drawn = self.look.drawn.get(&k);
+        let drawn = self.lines.drawn.get(&k);
         let line = match drawn {
             Some(d) => drawn_lines(points, self.came, &m.centre, self.axes, d),
             None => centre_lines(points, &self.out.position, &m.centre),

@@ -4,15 +4,13 @@ use super::look::Displaced;
 use super::plan_light::source;
 use super::plan_look::{acting_clumps, is_wet};
 use super::run::Runner;
-use super::{SkinPose, What, clumps, curves, export, groom, heat, instance, interpolate, layer_seed, shadow};
+use super::{SkinPose, What, clumps, curves, export, groom, heat, instance, interpolate, shadow};
 use crate::Error;
 use crate::config::{Keyed, PreviewTone, UpAxis, Vector};
 use crate::files::unfinished;
 use crate::format::{HairLayer, image::write_png};
 use crate::project::Project;
 use pelage_geom::{Offsets, SurfacePoint, Vec3};
-use pelage_groom::comb::Amount;
-use pelage_groom::instance::is_guard;
 use pelage_groom::look::clump::sides;
 use pelage_light::heat::{NO_VALUE, category_color, heat_color, range_of};
 use pelage_light::shadow::Source;
@@ -431,13 +429,8 @@ fn gloss(run: &mut Runner<'_>, drawn: &Drawn, i: usize, frame: i32) -> Result<Gl
     let wet: Vec<f32> = (0..hairs).map(|h| all.wet.get(h).map_or(0.0, |w| w[2]).max(shade.wetness as f32)).collect();
     let mut shine: Vec<f32> = wet.iter().map(|w| 1.0 + (WET_SHINE - 1.0) * w).collect();
     if guard {
-        let seed = u64::from(layer_seed(&run.project.groom.value.layer[i].name));
         let roots = instance::roots(run, i)?;
-        let (value, factor) = instance::guard_share(run, i, &roots)?;
-        let share = Amount { value, factor: &factor };
-        let guards = shine.iter_mut().zip(&roots.id).enumerate();
-        let guards = guards.filter(|(h, (_, id))| is_guard(**id, share.of(*h), seed));
-        guards.for_each(|(_, (s, _))| *s *= shade.guard as f32);
+        instance::scale_guard_hairs(run, i, &roots, shade.guard as f32, &mut shine)?;
     }
     let mut side = Vec::new();
     if let Some(&level) = acting_clumps(run.project, i).first()

@@ -93,8 +93,10 @@ pub struct Runner<'a> {
     pub(super) layers: BTreeMap<usize, Rc<super::interpolate::LayerHairs>>,
     pub(super) sites: BTreeMap<usize, Rc<super::clumps::RestSites>>,
     pub(super) members: BTreeMap<(usize, usize), Rc<pelage_groom::look::member::Members>>,
-    pub(super) looks: BTreeMap<(usize, bool), (Option<i32>, Rc<super::look::LayerLook>)>,
-    /// Clusters of the groom.
+    pub(super) looks: BTreeMap<(usize, bool), Rc<super::look::LayerLook>>,
+    /// With the frame that they are of, where they move.
+    pub(super) lines: BTreeMap<(usize, bool), (Option<i32>, Rc<super::look::CarriedLines>)>,
+    /// Clusters of the groom: at rest, and at the last frame that was asked for where they move.
     pub(super) tree: Vec<(Option<i32>, std::sync::Arc<pelage_groom::cluster::Tree>)>,
     pub(super) barrier: Option<Rc<super::look::Barrier>>,
     /// Particles of emitters that have a file.
@@ -151,6 +153,7 @@ impl<'a> Runner<'a> {
             sites: BTreeMap::new(),
             members: BTreeMap::new(),
             looks: BTreeMap::new(),
+            lines: BTreeMap::new(),
             tree: Vec::new(),
             barrier: None,
             particles: BTreeMap::new(),
@@ -239,6 +242,7 @@ impl<'a> Runner<'a> {
         self.sites.clear();
         self.members.clear();
         self.looks.clear();
+        self.lines.clear();
         self.scene = None;
     }
 

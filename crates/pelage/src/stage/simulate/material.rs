@@ -6,7 +6,6 @@ use crate::config::{Target, check_material_value};
 use crate::stage::groom::{self, CONTROL_SEED};
 use crate::stage::run::Runner;
 use crate::stage::{clumps, layer_seed};
-use pelage_groom::look::member::rest_sites;
 use pelage_groom::look::vary::Drawn;
 use pelage_sim::Material;
 use std::collections::BTreeMap;
@@ -23,9 +22,7 @@ pub(super) fn materials(run: &mut Runner<'_>, i: usize, source: &Source) -> Resu
     }
     let (skin, every) = (groom::skin(run)?, run.project.target(i) == Target::EveryHair);
     let seed = if every { u64::from(layer_seed(&run.project.groom.value.layer[i].name)) } else { CONTROL_SEED };
-    let (view, root) = (groom::view(&skin), &source.root);
-    let uv: Vec<[f32; 2]> = root.iter().map(|p| view.uv(p)).collect();
-    let (position, _) = rest_sites(&view, root, skin.origin());
+    let (uv, position) = groom::places(&skin, &source.root);
     let hairs = Drawn { id: &source.id, uv: &uv, position: &position, seed };
     let mut factor: BTreeMap<&str, Vec<f32>> = BTreeMap::new();
     for (key, v) in material.varied() {
